@@ -6,7 +6,7 @@
 //! 2⁵⁰⁰.
 
 use crate::exact::{Line, Verdict, is_degenerate};
-use crate::triangle::offset_from;
+use crate::triangle::{normal_of, offset_from};
 use crate::{Aabb, Corners, Frame};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -65,8 +65,9 @@ fn is_exact(point: DVec3) -> bool {
 
 impl DRay {
     /// The least size of a coordinate but 0: 2⁻¹⁵⁰.
-    pub(crate) const LEAST: f64 = 1.0 / (1u128 << 75) as f64 / (1u128 << 75) as f64;
-    const MOST: f64 = (1u128 << 120) as f64;
+    pub const LEAST: f64 = 1.0 / (1u128 << 75) as f64 / (1u128 << 75) as f64;
+    /// The greatest size of a coordinate: 2¹²⁰.
+    pub const MOST: f64 = (1u128 << 120) as f64;
     /// The greatest size of a direction's largest component.
     const LONG: f64 = (1u128 << 100) as f64;
 
@@ -253,9 +254,25 @@ impl DTriangle {
         point + offset_from(point, self.0)
     }
 
+    /// Returns the weights of the corners, as
+    /// [`Triangle::barycentrics`](crate::Triangle::barycentrics) does.
+    pub fn barycentrics(&self, ray: &DRay) -> Option<[f64; 3]> {
+        Line::new(ray.origin, ray.direction).barycentrics(&self.0)
+    }
+
+    /// Returns the unit normal, as [`Triangle::normal`](crate::Triangle::normal) does.
+    pub fn normal(&self) -> Option<DVec3> {
+        normal_of(self.0)
+    }
+
     fn distance(&self, ray: &DRay, is_moved: bool) -> Option<f64> {
         let ends = [ray.origin, ray.direction];
-        let t = Line::new(ray.origin, ray.direction).crossing(ends, &self.0, is_moved)?;
+        let line = Line::new(ray.origin, ray.direction);
+        let t = match line.filter(&self.0) {
+            // It crosses, and twice f64 nearly always rounds its distance.
+            Verdict::Between(..) => line.rounded(ends, &self.0),
+            _ => line.crossing(ends, &self.0, is_moved)?,
+        };
         ray.is_in_range(t).then_some(t)
     }
 

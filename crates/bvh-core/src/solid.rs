@@ -220,12 +220,8 @@ impl Traced for WideBvh {
         let mut hits = Vec::new();
         let mut counts = vec![0; rays.len()];
         self.all_hits_of(&rays, &mut hits, &mut counts);
-        let mut hits = &hits[..];
-        for (inside, count) in inside.iter_mut().zip(counts) {
-            let hits_of_point;
-            (hits_of_point, hits) = hits.split_at(count as usize);
-            *inside = is_inside(&mut hits_of_point.iter().map(|hit| hit.object));
-        }
+        let hits: Vec<u32> = hits.iter().map(|hit| hit.object).collect();
+        tell(&hits, &counts, inside, is_inside);
     }
 
     fn closest_to(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
@@ -246,16 +242,35 @@ impl Traced for DWideBvh {
         inside: &mut [bool],
         is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
     ) {
-        for (&point, inside) in points.iter().zip(inside) {
+        let half_line = |&point: &DVec3| {
             let point = point.map(|x| if x.abs() < DRay::LEAST { 0.0 } else { x });
-            // A point beyond the range of all coordinates is outside.
+            // A point beyond the range of all coordinates is outside: its range is empty.
             let ray = DRay::half_line(point, DVec3::X);
-            let hits = ray.map(|ray| self.all_hits(&ray)).unwrap_or_default();
-            *inside = is_inside(&mut hits.iter().map(|hit| hit.object));
-        }
+            ray.or_else(|_| DRay::new(DVec3::ZERO, DVec3::X, 1.0, 0.0)).expect("a valid ray")
+        };
+        let rays: Vec<DRay> = points.iter().map(half_line).collect();
+        let mut hits = Vec::new();
+        let mut counts = vec![0; rays.len()];
+        self.all_hits_of(&rays, &mut hits, &mut counts);
+        let hits: Vec<u32> = hits.iter().map(|hit| hit.object).collect();
+        tell(&hits, &counts, inside, is_inside);
     }
 
     fn closest_to(&self, points: &[DVec3], closest: &mut [Option<Closest>]) {
         self.closest_points(points, closest);
+    }
+}
+
+/// Writes whether `is_inside` holds for the triangles that each half line crosses, so many of each.
+fn tell(
+    mut crossed: &[u32],
+    counts: &[u32],
+    inside: &mut [bool],
+    is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
+) {
+    for (inside, &count) in inside.iter_mut().zip(counts) {
+        let of_point;
+        (of_point, crossed) = crossed.split_at(count as usize);
+        *inside = is_inside(&mut of_point.iter().copied());
     }
 }

@@ -58,9 +58,7 @@ impl Triangle {
     /// triangle's plane. Their sum is 1. They interpolate values of the corners, such as normals,
     /// at a hit. Returns `None` for a ray in the plane.
     pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
-        let weights = ray.line().weights(&self.0);
-        let sum: f64 = weights.iter().sum();
-        (sum != 0.0).then(|| weights.map(|weight| weight / sum))
+        ray.line().barycentrics(&self.0)
     }
 
     /// Returns the triangle moved by a transform, such as the transform of an
@@ -74,12 +72,7 @@ impl Triangle {
     /// Returns the unit vector perpendicular to the triangle, on the side from which its corners
     /// run counterclockwise, computed in f64; `None` for a degenerate triangle.
     pub fn normal(&self) -> Option<Vec3> {
-        let [a, b, c] = self.0.map(Vec3::as_dvec3);
-        // Scaled edges have lengths of about one, so their product neither overflows nor
-        // underflows.
-        let scale = (b - a).abs().max((c - a).abs()).max_element();
-        let normal = ((b - a) / scale).cross((c - a) / scale).try_normalize();
-        normal.map(|normal| normal.as_vec3())
+        normal_of(self.corners()).map(|normal| normal.as_vec3())
     }
 
     /// Returns whether the corners coincide or are collinear, in real arithmetic. Such a triangle is
@@ -186,6 +179,13 @@ impl<T: Corners> InFrame<'_, T> {
     }
 }
 
+/// Returns the unit vector perpendicular to a triangle, `None` for a degenerate one.
+pub(crate) fn normal_of([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
+    // Scaled edges have lengths of about one, so their product neither overflows nor underflows.
+    let scale = (b - a).abs().max((c - a).abs()).max_element();
+    ((b - a) / scale).cross((c - a) / scale).try_normalize()
+}
+
 /// Returns the vector from `point` to the nearest point of the triangle of these corners. Triangles
 /// with a common edge or corner compute the same bits for a nearest point on it. Rounded or not, the
 /// point is in the box of the corners, so no box along the file's axes around the triangle is
@@ -244,6 +244,7 @@ fn greater(a: DVec3, b: DVec3) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{DRay, DTriangle};
 
     #[test]
     fn the_weights_of_the_corners_are_those_of_the_point_that_is_hit() {
@@ -259,6 +260,9 @@ mod tests {
             for direction in [Vec3::Z, -Vec3::Z, Vec3::new(0.5, -0.25, 1.0)] {
                 let ray = Ray::half_line(target - direction * 2.0, direction).unwrap();
                 assert_eq!(triangle.barycentrics(&ray), Some(expected));
+                let [origin, direction] = ray.ends().map(Vec3::as_dvec3);
+                let ray = DRay::half_line(origin, direction).unwrap();
+                assert_eq!(DTriangle(triangle.corners()).barycentrics(&ray), Some(expected));
             }
         }
         let in_plane = Ray::half_line(triangle.0[0], triangle.0[1] - triangle.0[0]).unwrap();
@@ -275,6 +279,7 @@ mod tests {
                 Vec3::new(0.0, scale, 0.0),
             ]);
             assert_eq!(triangle.normal(), Some(Vec3::Z), "2^{exponent}");
+            assert_eq!(DTriangle(triangle.corners()).normal(), Some(DVec3::Z), "2^{exponent}");
             let [a, b, c] = triangle.0;
             assert_eq!(Triangle([a, c, b]).normal(), Some(-Vec3::Z), "2^{exponent}");
         }

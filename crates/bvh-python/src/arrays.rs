@@ -2,13 +2,10 @@
 //! type, order, strides and alignment. Errors name the argument, the value found and the values
 //! accepted.
 
-use bvh_search::bvh_core::glam::DVec3;
-use bvh_search::bvh_core::{InvalidRay, MeshError, Primitives};
+use crate::precision::{Precision, Real, with_precision};
+use bvh_search::bvh_core::MAX_OBJECTS;
 use bvh_search::{Objects, prelude::*};
-use numpy::{
-    Element, PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods,
-};
+use numpy::{Element, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::fmt::Display;
@@ -56,9 +53,6 @@ impl<'py, T: Element> Array<'py, T> {
 
 /// The kinds of elements that are accepted, by numpy's letters, and their name.
 type Kinds = (&'static str, &'static str);
-
-/// The range of numbers.
-const FLOAT32: &str = "finite numbers of float32, up to 3.4e38";
 
 const REAL_NUMBERS: Kinds = ("biuf", "real numbers");
 const INTEGERS: Kinds = ("iu", "integers");
@@ -116,17 +110,19 @@ pub fn numbers<'py, T: Number>(
     Err(invalid(format!("{name} has shape {}; accepted: {accepted}", array.getattr("shape")?)))
 }
 
-/// Reads `float32`, all of whose numbers count.
-fn single_numbers<'py>(
+/// Reads numbers that all count.
+fn coordinates<'py, N: Real>(
     name: &str,
     argument: &Bound<'py, PyAny>,
     accepted: &str,
     accepts: impl Fn(&[usize]) -> bool,
-) -> PyResult<Array<'py, f32>> {
-    let array = numbers::<f32>(name, argument, accepted, accepts)?;
-    if let Some(infinite) = array.elements()?.iter().position(|number| number.is_infinite()) {
-        let [found] = array.given(infinite)?;
-        return Err(invalid(format!("{name} has {found:?}; accepted: {FLOAT32}")));
+) -> PyResult<Array<'py, N>> {
+    let array = numbers::<N>(name, argument, accepted, accepts)?;
+    if let Some(wrong) = array.elements()?.iter().position(|number| !number.is_accepted()) {
+        let [found] = array.given(wrong)?;
+        let row = wrong / (array.elements()?.len() / array.shape()[0]);
+        let accepted = N::ACCEPTED;
+        return Err(invalid(format!("{name} has {found:?} in row {row}; accepted: {accepted}")));
     }
     Ok(array)
 }
@@ -162,16 +158,13 @@ fn check_elements(
 }
 
 /// Reads triangles with three corners each.
-pub fn triangles(argument: &Bound<PyAny>) -> PyResult<Objects> {
-    let array =
-        single_numbers("triangles", argument, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
-    let triangles: &[Triangle] = bytemuck::cast_slice(array.elements()?);
-    Ok(shapes(triangles.to_vec()))
-}
-
-/// Makes objects that can be divided.
-pub fn shapes(triangles: Vec<Triangle>) -> Objects {
-    Objects::Shapes(Primitives::Triangles(triangles))
+pub fn triangles(argument: &Bound<PyAny>, precision: Precision) -> PyResult<Objects> {
+    let is_triangles = |shape: &[usize]| matches!(shape, [_, 3, 3]);
+    with_precision!(precision, N => {
+        let array = coordinates::<N>("triangles", argument, "(n, 3, 3)", is_triangles)?;
+        let triangles = bytemuck::cast_slice(array.elements()?).to_vec();
+        Ok(Objects::Shapes(N::shapes(triangles)))
+    })
 }
 
 /// The names of the arguments that are a mesh.
@@ -184,20 +177,27 @@ pub struct MeshNames {
 /// The arguments of `Tree.from_mesh` and `Tree.update`.
 pub const MESH: MeshNames = MeshNames { vertices: "vertices", faces: "faces" };
 
+/// The vertices of each face.
+pub type Faces = Vec<[u32; 3]>;
+
 /// Reads the vertices of a mesh, `(v, 3)`, and its faces, `(n, 3)`. Returns triangles and faces.
-pub fn mesh(
+pub fn mesh<N: Real>(
     names: MeshNames,
     vertices: &Bound<PyAny>,
     faces: &Bound<PyAny>,
-) -> PyResult<(Vec<Triangle>, Vec<[u32; 3]>)> {
+) -> PyResult<(Vec<N::Triangle>, Faces)> {
     let faces = numbers::<i64>(names.faces, faces, "(n, 3)", |shape| matches!(shape, [_, 3]))?;
-    let vertices = positions(names, vertices)?;
-    let accepted = vertices.shape()[0];
+    let vertices = positions::<N>(names, vertices)?;
+    let (count, accepted) = (faces.shape()[0], vertices.shape()[0]);
+    if count > MAX_OBJECTS {
+        let found = format!("{} has {count} faces", names.faces);
+        return Err(invalid(format!("{found}; accepted: at most {MAX_OBJECTS}")));
+    }
     let outside = |face: usize, vertex: i64| {
         let found = format!("{}: face {face} names vertex {vertex}", names.faces);
         invalid(format!("{found}; accepted: indices below {accepted}"))
     };
-    let mut indices = Vec::with_capacity(faces.shape()[0]);
+    let mut indices = Vec::with_capacity(count);
     for (face, corners) in faces.elements()?.as_chunks::<3>().0.iter().enumerate() {
         let mut index = [0; 3];
         for (index, &corner) in index.iter_mut().zip(corners) {
@@ -210,353 +210,84 @@ pub fn mesh(
     Ok((triangles, indices))
 }
 
-/// Reads the vertices of a mesh with known faces.
-pub fn moved_mesh(vertices: &Bound<PyAny>, faces: &[[u32; 3]]) -> PyResult<Objects> {
-    let vertices = positions(MESH, vertices)?;
-    let found = vertices.shape()[0];
-    // The faces are known to be right, so the vertices are too few.
-    let missing = |face: usize, vertex: u32| {
-        let accepted = format!("a row for vertex {vertex}, which face {face} names");
-        invalid(format!("{} has shape ({found}, 3); accepted: {accepted}", MESH.vertices))
-    };
-    triangles_of(MESH, &vertices, faces, missing).map(shapes)
+/// Reads a mesh as the objects of a tree, and its faces.
+pub fn mesh_objects(
+    vertices: &Bound<PyAny>,
+    faces: &Bound<PyAny>,
+    precision: Precision,
+) -> PyResult<(Objects, Faces)> {
+    with_precision!(precision, N => {
+        let (triangles, faces) = mesh::<N>(MESH, vertices, faces)?;
+        Ok((Objects::Shapes(N::shapes(triangles)), faces))
+    })
 }
 
-fn positions<'py>(names: MeshNames, vertices: &Bound<'py, PyAny>) -> PyResult<Array<'py, f32>> {
-    numbers::<f32>(names.vertices, vertices, "(v, 3)", |shape| matches!(shape, [_, 3]))
+/// Reads the vertices of a mesh with known faces.
+pub fn moved_mesh(
+    vertices: &Bound<PyAny>,
+    faces: &[[u32; 3]],
+    precision: Precision,
+) -> PyResult<Objects> {
+    with_precision!(precision, N => {
+        let vertices = positions::<N>(MESH, vertices)?;
+        let found = vertices.shape()[0];
+        // The faces are known to be right, so the vertices are too few.
+        let missing = |face: usize, vertex: u32| {
+            let accepted = format!("a row for vertex {vertex}, which face {face} names");
+            invalid(format!("{} has shape ({found}, 3); accepted: {accepted}", MESH.vertices))
+        };
+        triangles_of(MESH, &vertices, faces, missing).map(N::shapes).map(Objects::Shapes)
+    })
+}
+
+fn positions<'py, N: Real>(
+    names: MeshNames,
+    vertices: &Bound<'py, PyAny>,
+) -> PyResult<Array<'py, N>> {
+    numbers::<N>(names.vertices, vertices, "(v, 3)", |shape| matches!(shape, [_, 3]))
 }
 
 /// Makes the triangles of a mesh. `unknown` creates the error of a face, by its number, that names
-/// a vertex which does not exist.
-fn triangles_of(
+/// a vertex which does not exist. A vertex that no face uses may be anywhere.
+fn triangles_of<N: Real>(
     names: MeshNames,
-    vertices: &Array<f32>,
+    vertices: &Array<N>,
     faces: &[[u32; 3]],
     unknown: impl Fn(usize, u32) -> PyErr,
-) -> PyResult<Vec<Triangle>> {
-    let (corners, _) = vertices.elements()?.as_chunks::<3>();
-    Triangle::from_mesh(corners, faces).map_err(|error| match error {
-        MeshError::Index { triangle, index, .. } => unknown(triangle, index),
-        MeshError::NotFinite { triangle, index, .. } => {
-            match vertices.given::<3>(3 * index as usize) {
-                Ok(found) => {
-                    let found = format!("vertex {index} of face {triangle} is {found:?}");
-                    invalid(format!("{}: {found}; accepted: {FLOAT32}", names.vertices))
-                }
-                Err(error) => error,
+) -> PyResult<Vec<N::Triangle>> {
+    let (positions, _) = vertices.elements()?.as_chunks::<3>();
+    let mut triangles = Vec::with_capacity(faces.len());
+    for (face, &vertex_ids) in faces.iter().enumerate() {
+        let mut corners = [[N::default(); 3]; 3];
+        for (corner, vertex) in corners.iter_mut().zip(vertex_ids) {
+            *corner = *positions.get(vertex as usize).ok_or_else(|| unknown(face, vertex))?;
+            if !corner.iter().all(|x| x.is_accepted()) {
+                let found = vertices.given::<3>(3 * vertex as usize)?;
+                let found = format!("vertex {vertex} of face {face} is {found:?}");
+                let accepted = N::ACCEPTED;
+                return Err(invalid(format!("{}: {found}; accepted: {accepted}", names.vertices)));
             }
         }
-        MeshError::TooMany(_) => invalid(format!("{}: {error}", names.faces)),
-    })
+        triangles.push(corners.into());
+    }
+    Ok(triangles)
 }
 
 /// Reads recorded rays: segments of the shape `(m, 2, 3)`.
 pub fn segments(argument: Option<&Bound<PyAny>>) -> PyResult<Vec<Segment>> {
     let Some(argument) = argument else { return Ok(vec![]) };
-    let array = single_numbers("rays", argument, "(m, 2, 3)", |shape| matches!(shape, [_, 2, 3]))?;
+    let array =
+        coordinates::<f32>("rays", argument, "(m, 2, 3)", |shape| matches!(shape, [_, 2, 3]))?;
     let (segments, _) = array.elements()?.as_chunks::<6>();
     let segment = |&[a, b, c, d, e, f]: &[f32; 6]| Segment { from: [a, b, c], to: [d, e, f] };
     Ok(segments.iter().map(segment).collect())
 }
 
-/// Reads points, `(m, 3)`, relative to the place of the tree.
-pub fn points(argument: &Bound<PyAny>, place: Option<&Place>) -> PyResult<Vec<Vec3>> {
-    let points = Vectors::read("points", argument, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
-    let slice = points.slice()?;
-    Ok((0..points.len())
-        .map(|index| match place {
-            Some(place) => (slice.exact(index) - place.center).as_vec3(),
-            None => slice.at(index),
-        })
-        .collect())
-}
-
-/// Reads a point.
-pub fn point(name: &str, argument: &Bound<PyAny>) -> PyResult<DVec3> {
-    let array = numbers::<f64>(name, argument, "(3,)", |shape| shape == [3])?;
-    let point = DVec3::from_slice(array.elements()?);
-    if !point.is_finite() {
-        return Err(invalid(format!("{name} is {point}; accepted: finite coordinates")));
-    }
-    Ok(point)
-}
-
 /// Reads boxes with a lower and an upper corner each.
 pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
-    let array = single_numbers("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
+    let array = coordinates::<f32>("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
         matches!(shape, [_, 2, 3] | [_, 6])
     })?;
     let boxes: &[Aabb] = bytemuck::cast_slice(array.elements()?);
     Ok(Objects::Boxes(boxes.to_vec()))
-}
-
-/// Points or directions in either precision: `float64` is rounded vector by vector, without a copy
-/// of the array.
-pub enum Vectors<'py> {
-    Single(Array<'py, f32>),
-    Double(Array<'py, f64>),
-}
-
-impl<'py> Vectors<'py> {
-    pub fn read(
-        name: &str,
-        argument: &Bound<'py, PyAny>,
-        accepted: &str,
-        accepts: impl Fn(&[usize]) -> bool,
-    ) -> PyResult<Self> {
-        // In either byte order.
-        let is_single = argument.cast::<PyUntypedArray>().is_ok_and(|array| {
-            let dtype = array.dtype();
-            dtype.kind() == b'f' && dtype.itemsize() <= size_of::<f32>()
-        });
-        if is_single {
-            numbers::<f32>(name, argument, accepted, accepts).map(Self::Single)
-        } else {
-            numbers::<f64>(name, argument, accepted, accepts).map(Self::Double)
-        }
-    }
-
-    pub fn into_numpy(self) -> Bound<'py, PyAny> {
-        match self {
-            Self::Single(array) => array.into_numpy().into_any(),
-            Self::Double(array) => array.into_numpy().into_any(),
-        }
-    }
-
-    fn len(&self) -> usize {
-        let shape = match self {
-            Self::Single(array) => array.shape(),
-            Self::Double(array) => array.shape(),
-        };
-        shape.iter().product::<usize>() / 3
-    }
-
-    fn slice(&self) -> PyResult<VectorSlice<'_>> {
-        Ok(match self {
-            Self::Single(array) => VectorSlice::Single(array.elements()?.as_chunks().0),
-            Self::Double(array) => VectorSlice::Double(array.elements()?.as_chunks().0),
-        })
-    }
-}
-
-/// A vector for each index, or one for all.
-#[derive(Clone, Copy)]
-enum VectorSlice<'a> {
-    Single(&'a [[f32; 3]]),
-    Double(&'a [[f64; 3]]),
-}
-
-impl VectorSlice<'_> {
-    #[inline(always)]
-    fn at(self, index: usize) -> Vec3 {
-        match self {
-            Self::Single(vectors) => Vec3::from(*at(vectors, index)),
-            Self::Double(vectors) => Vec3::from(at(vectors, index).map(|x| x as f32)),
-        }
-    }
-
-    fn exact(self, index: usize) -> DVec3 {
-        match self {
-            Self::Single(vectors) => Vec3::from(*at(vectors, index)).as_dvec3(),
-            Self::Double(vectors) => DVec3::from(*at(vectors, index)),
-        }
-    }
-}
-
-/// Returns an element; the first one is for all later ones that are missing.
-#[inline(always)]
-fn at<T>(elements: &[T], index: usize) -> &T {
-    elements.get(index).unwrap_or(&elements[0])
-}
-
-/// The place of a tree in a world whose coordinates `float32` is too coarse for.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    /// The point of the world that is the tree's zero.
-    pub center: DVec3,
-    /// The middle of the tree's box, relative to the centre, and its distance from the corners.
-    sphere: (DVec3, f64),
-}
-
-impl Place {
-    pub fn new(center: DVec3, bounds: Option<Aabb>) -> Self {
-        let bounds = bounds.unwrap_or(Aabb { min: Vec3::ZERO, max: Vec3::ZERO });
-        let [min, max] = [bounds.min.as_dvec3(), bounds.max.as_dvec3()];
-        Self { center, sphere: ((min + max) / 2.0, (max - min).length() / 2.0) }
-    }
-
-    /// Advances a ray that begins far away to the sphere around the tree's box. Returns the origin
-    /// relative to the centre, and its distance in multiples of the direction's length. It is exact
-    /// enough for a ray that misses the sphere: that ray advances to its point next to the sphere.
-    ///
-    /// A ray that is not so far away stays where it is if `f32` has its origin: distances and limits
-    /// are then exact.
-    fn advanced(&self, origin: DVec3, direction: DVec3) -> (Vec3, f64) {
-        /// The largest distance of rays that may stay, in radii. The rounding of a direction moves a
-        /// ray further the longer it is.
-        const NEAR: f64 = 16.0;
-        let (middle, radius) = self.sphere;
-        let origin = origin - self.center;
-        let square = direction.length_squared();
-        let nearest = (middle - origin).dot(direction) / square;
-        let distance = nearest - radius / square.sqrt();
-        let is_near = distance * square.sqrt() <= NEAR * radius;
-        let may_stay = is_near && origin.as_vec3().as_dvec3() == origin;
-        if distance > 0.0 && distance.is_finite() && !may_stay {
-            ((origin + distance * direction).as_vec3(), distance)
-        } else {
-            (origin.as_vec3(), 0.0)
-        }
-    }
-}
-
-/// Returns the largest range of `f32` within a range: no distance outside is let in.
-fn inward([t_min, t_max]: [f64; 2]) -> [f32; 2] {
-    let up = |t: f64| if f64::from(t as f32) < t { (t as f32).next_up() } else { t as f32 };
-    [up(t_min), -up(-t_max)]
-}
-
-/// The arrays of rays. Each has one element for all rays or one per ray.
-pub struct RayArrays<'py> {
-    rays: usize,
-    origins: Vectors<'py>,
-    directions: Vectors<'py>,
-    limits: [Vec<f64>; 2],
-    /// Whether an invalid ray hits nothing, instead of being an error.
-    misses: bool,
-}
-
-impl<'py> RayArrays<'py> {
-    /// Reads the arguments of a call. `invalid` is `error` or `miss`.
-    pub fn read(
-        origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
-        t_min: Option<&Bound<'py, PyAny>>,
-        t_max: Option<&Bound<'py, PyAny>>,
-        invalid: &str,
-    ) -> PyResult<Self> {
-        let misses = match invalid {
-            "error" => false,
-            "miss" => true,
-            _ => {
-                let message = format!("invalid is {invalid:?}; accepted: error, miss");
-                return Err(self::invalid(message));
-            }
-        };
-        let are_vectors = |shape: &[usize]| matches!(shape, [_, 3] | [3]);
-        let origins = Vectors::read("origins", origins, "(m, 3) or (3,)", are_vectors)?;
-        let accepted = match origins.len() {
-            1 => "(m, 3) or (3,)".to_owned(),
-            rays => format!("({rays}, 3), as origins, or (3,)"),
-        };
-        let directions = Vectors::read("directions", directions, &accepted, |shape| {
-            are_vectors(shape) && (origins.len() == 1 || matches!(shape, [3] | [1, 3]))
-                || shape == [origins.len(), 3]
-        })?;
-        let rays = if origins.len() == 1 { directions.len() } else { origins.len() };
-        let accepted = format!("a number or ({rays},), as origins");
-        let mut limits = [vec![0.0], vec![f64::INFINITY]];
-        for ((name, argument), limit) in
-            [("t_min", t_min), ("t_max", t_max)].into_iter().zip(&mut limits)
-        {
-            if let Some(argument) = argument {
-                // An array without axes is one number for all rays.
-                *limit = numbers::<f64>(name, argument, &accepted, |shape| {
-                    shape.is_empty() || shape == [rays]
-                })?
-                .elements()?
-                .to_vec();
-            }
-        }
-        Ok(Self { rays, origins, directions, limits, misses })
-    }
-
-    /// Returns the rays for threads without Python.
-    pub fn source(&self, place: Option<Place>) -> PyResult<RaySource<'_>> {
-        Ok(RaySource {
-            origins: self.origins.slice()?,
-            directions: self.directions.slice()?,
-            limits: self.limits.each_ref().map(Vec::as_slice),
-            rays: self.rays,
-            misses: self.misses,
-            place,
-        })
-    }
-}
-
-/// Rays in arrays.
-#[derive(Clone, Copy)]
-pub struct RaySource<'a> {
-    origins: VectorSlice<'a>,
-    directions: VectorSlice<'a>,
-    limits: [&'a [f64]; 2],
-    pub rays: usize,
-    misses: bool,
-    place: Option<Place>,
-}
-
-/// Consecutive rays.
-#[derive(Default)]
-pub struct Batch {
-    pub rays: Vec<Ray>,
-    /// The distances by which the rays have been advanced; none if no ray has.
-    advances: Vec<f64>,
-}
-
-impl Batch {
-    /// Returns the distance of a hit from the origin that the caller gave.
-    pub fn distance(&self, ray: usize, t: f32) -> f32 {
-        match self.advances.get(ray) {
-            Some(advance) => (advance + f64::from(t)) as f32,
-            None => t,
-        }
-    }
-}
-
-impl RaySource<'_> {
-    /// Returns the batch of this number, of batches of so many rays, or the fault of an invalid ray.
-    pub fn batch(&self, number: usize, size: usize) -> Result<Batch, String> {
-        let mut batch = Batch::default();
-        for index in (number * size..self.rays).take(size) {
-            let direction = self.directions.at(index);
-            let (origin, advance) = match self.place {
-                Some(place) => {
-                    place.advanced(self.origins.exact(index), self.directions.exact(index))
-                }
-                None => (self.origins.at(index), 0.0),
-            };
-            let limits = self.limits.map(|limits| *at(limits, index));
-            let [t_min, t_max] = limits.map(|t| t as f32);
-            let inner = inward(limits.map(|t| t - advance));
-            let ray = match Ray::new(origin, direction, t_min, t_max) {
-                // An empty range hits nothing.
-                Err(_) if self.misses => Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0),
-                // The limits next to the caller's, and not their neighbours.
-                Err(error) => return Err(self.fault(index, &error)),
-                Ok(ray) if inner == [t_min, t_max] => ray,
-                Ok(_) => Ray::assume_valid(origin, direction, inner[0], inner[1]),
-            };
-            batch.rays.push(ray);
-            if self.place.is_some() {
-                batch.advances.push(advance);
-            }
-        }
-        Ok(batch)
-    }
-
-    /// Says what is wrong with a ray, in the caller's numbers.
-    fn fault(&self, index: usize, error: &InvalidRay) -> String {
-        let [origin, direction] =
-            [self.origins, self.directions].map(|v| v.exact(index).to_array());
-        match error {
-            InvalidRay::Origin(_) => {
-                format!("ray {index}: the ray's origin is {origin:?}; accepted: {FLOAT32}")
-            }
-            InvalidRay::Direction(_) => format!(
-                "ray {index}: the ray's direction is {direction:?}; accepted: finite, its largest \
-                 component between 2^-100 and 2^100"
-            ),
-            InvalidRay::Range { .. } => format!("ray {index}: {error}"),
-        }
-    }
 }

@@ -1,9 +1,11 @@
 #![doc = include_str!("../README.md")]
 
+mod answers;
 mod arrays;
 mod improver;
-mod locations;
 mod pickle;
+mod precision;
+mod rays;
 mod scalars;
 mod scene;
 mod search;
@@ -16,7 +18,7 @@ mod tree;
 #[pyo3::pymodule(name = "_bvh_search")]
 mod module {
     #[pymodule_export]
-    use crate::{locations::locations, scene::corners, scene::rows, tracer::Tracer, tree::Tree};
+    use crate::{scene::corners, scene::rows, tracer::Tracer, tree::Tree};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's name")]

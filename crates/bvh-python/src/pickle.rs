@@ -1,7 +1,9 @@
 //! The bytes in the pickle of a tree. A pickle may be forged, so every part is checked.
 
-use crate::arrays::{invalid, shapes};
+use crate::arrays::invalid;
+use crate::precision::Real;
 use crate::threads::detached;
+use bvh_search::bvh_core::DTriangle;
 use bvh_search::{Objects, OwnedTree};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -18,9 +20,10 @@ pub fn state<'py>(
 ) -> PyResult<State<'py>> {
     let bytes = |numbers: &[u8]| PyBytes::new(py, numbers);
     let tree = detached(py, || owned.save())?.map_err(invalid)?;
-    let (shape, objects) = match owned.triangles() {
-        Some(triangles) => ("triangles", bytes(bytemuck::cast_slice(triangles))),
-        None => ("boxes", bytes(bytemuck::cast_slice(owned.boxes()))),
+    let (shape, objects) = match (owned.triangles(), owned.doubles()) {
+        (Some(triangles), _) => ("triangles", bytes(bytemuck::cast_slice(triangles))),
+        (_, Some(doubles)) => ("doubles", bytes(bytemuck::cast_slice(doubles))),
+        _ => ("boxes", bytes(bytemuck::cast_slice(owned.boxes()))),
     };
     let faces = faces.map(|faces| bytes(bytemuck::cast_slice(faces)));
     Ok((shape, objects, bytes(&tree), faces))
@@ -29,9 +32,18 @@ pub fn state<'py>(
 /// Restores a tree.
 pub fn tree(py: Python, shape: &str, objects: &[u8], tree: &[u8]) -> PyResult<OwnedTree> {
     let objects = match shape {
-        "triangles" => shapes(numbers("objects", objects)?),
+        "triangles" => Objects::Shapes(f32::shapes(numbers("objects", objects)?)),
+        "doubles" => {
+            let triangles: Vec<DTriangle> = numbers("objects", objects)?;
+            DTriangle::check(&triangles).map_err(|error| invalid(format!("objects: {error}")))?;
+            Objects::Shapes(f64::shapes(triangles))
+        }
         "boxes" => Objects::Boxes(numbers("objects", objects)?),
-        _ => return Err(invalid(format!("shape is {shape:?}; accepted: triangles, boxes"))),
+        _ => {
+            return Err(invalid(format!(
+                "shape is {shape:?}; accepted: triangles, doubles, boxes"
+            )));
+        }
     };
     let loaded = detached(py, || OwnedTree::load(objects, tree))?;
     loaded.map_err(|error| invalid(format!("tree: {error}")))
@@ -40,7 +52,8 @@ pub fn tree(py: Python, shape: &str, objects: &[u8], tree: &[u8]) -> PyResult<Ow
 /// Restores the faces of a mesh, whose triangles are the objects of the tree.
 pub fn faces(owned: &OwnedTree, faces: &[u8]) -> PyResult<Vec<[u32; 3]>> {
     let faces: Vec<[u32; 3]> = numbers("faces", faces)?;
-    let accepted = owned.triangles().map_or(0, <[_]>::len);
+    let is_mesh = owned.triangles().is_some() || owned.doubles().is_some();
+    let accepted = if is_mesh { owned.objects() } else { 0 };
     if faces.len() != accepted {
         let found = faces.len();
         return Err(invalid(format!("faces has {found} faces; accepted: {accepted}, as objects")));

@@ -1,26 +1,27 @@
 //! The functions that check the arrays of the class `RaycastingScene`.
 
-use crate::arrays::{MeshNames, Vectors, mesh, numbers};
-use numpy::{IntoPyArray, PyArray3, PyArrayMethods};
+use crate::arrays::{MeshNames, mesh};
+use crate::precision::{Precision, with_precision};
+use crate::rays::Vectors;
+use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 
 /// The arguments of `RaycastingScene.add_triangles`.
 const NAMES: MeshNames = MeshNames { vertices: "vertex_positions", faces: "triangle_indices" };
 
-/// Returns the corners, `(n, 3, 3)` in `float64`, of the triangles of a mesh, with the checks of
-/// `Tree.from_mesh`.
+/// Returns the corners, `(n, 3, 3)`, of the triangles of a mesh, with the checks of
+/// `Tree.from_mesh`: in `float32` if the vertices are, and otherwise in `float64`.
 #[pyfunction]
 pub fn corners<'py>(
     vertex_positions: &Bound<'py, PyAny>,
     triangle_indices: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let (_, faces) = mesh(NAMES, vertex_positions, triangle_indices)?;
-    let vertices =
-        numbers::<f64>(NAMES.vertices, vertex_positions, "(v, 3)", |shape| shape.len() == 2)?;
-    let (vertices, _) = vertices.elements()?.as_chunks::<3>();
-    let numbers: Vec<f64> =
-        faces.as_flattened().iter().flat_map(|&vertex| vertices[vertex as usize]).collect();
-    numbers.into_pyarray(vertex_positions.py()).reshape([faces.len(), 3, 3])
+) -> PyResult<Bound<'py, PyAny>> {
+    with_precision!(Precision::of(vertex_positions), N => {
+        let (triangles, _) = mesh::<N>(NAMES, vertex_positions, triangle_indices)?;
+        let numbers: Vec<N> = bytemuck::cast_slice(&triangles).to_vec();
+        let corners = numbers.into_pyarray(vertex_positions.py());
+        Ok(corners.reshape([triangles.len(), 3, 3])?.into_any())
+    })
 }
 
 /// Converts the argument called `name` to `float32` or `float64` and checks that its last axis has

@@ -1,9 +1,10 @@
 //! The class `Tree`: trees over arrays, found, improved, measured, saved, loaded, and copied as
 //! nodes.
 
-use crate::arrays::{MESH, boxes, invalid, mesh, moved_mesh, segments, shapes, triangles};
+use crate::arrays::{boxes, invalid, mesh_objects, moved_mesh, segments, triangles};
 use crate::improver::Improver;
 use crate::pickle::{self, State};
+use crate::precision::Precision;
 use crate::scalars;
 use crate::search::{self, Limits};
 use crate::threads::detached;
@@ -34,7 +35,9 @@ use std::sync::{Arc, PoisonError, RwLock, RwLockWriteGuard};
 /// times per second with the elapsed time and the lowest cost so far; if it raises an exception,
 /// the search ends. `rays` are recorded rays of the shape `(m, 2, 3)`, from their origins to their
 /// hits: the tree is then for rays like these. `references` above 1, up to 16, divides triangles
-/// among leaves, on average into that many parts each; 1 keeps them whole.
+/// among leaves, on average into that many parts each; 1 keeps them whole. With
+/// `precision="double"` the triangles have `float64` coordinates, each 0 or 2^-150 to 2^120 in size,
+/// and `Tracer` answers in `float64`.
 ///
 /// >>> from bvh_search import Tree
 /// >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -84,7 +87,7 @@ impl Tree {
     ///
     /// >>> mesh = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], work=100)
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, seconds = None, *, references = None, seed = 1, work = None, progress = None, rays = None, frame = "auto"))]
+    #[pyo3(signature = (vertices, faces, seconds = None, *, references = None, seed = 1, work = None, progress = None, rays = None, frame = "auto", precision = "single"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn from_mesh(
         vertices: &Bound<PyAny>,
@@ -96,13 +99,14 @@ impl Tree {
         progress: Option<Py<PyAny>>,
         rays: Option<&Bound<PyAny>>,
         frame: &str,
+        precision: &str,
     ) -> PyResult<Self> {
-        let (triangles, faces) = mesh(MESH, vertices, faces)?;
+        let (objects, faces) = mesh_objects(vertices, faces, Precision::read(precision)?)?;
         let limits = Limits { seconds, work, progress };
         let rays = &segments(rays)?;
         let frame = frames(frame)?;
         let options = Options { references, seed, rays, frame, ..Options::default() };
-        let mut tree = found(vertices.py(), "vertices", shapes(triangles), &options, limits)?;
+        let mut tree = found(vertices.py(), "vertices", objects, &options, limits)?;
         tree.faces = Some(Arc::new(faces));
         Ok(tree)
     }
@@ -111,7 +115,7 @@ impl Tree {
     ///
     /// >>> triangle = Tree.from_triangles([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], seconds=0.1)
     #[staticmethod]
-    #[pyo3(signature = (triangles, seconds = None, *, references = None, seed = 1, work = None, progress = None, rays = None, frame = "auto"))]
+    #[pyo3(signature = (triangles, seconds = None, *, references = None, seed = 1, work = None, progress = None, rays = None, frame = "auto", precision = "single"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn from_triangles(
         triangles: &Bound<PyAny>,
@@ -122,8 +126,9 @@ impl Tree {
         progress: Option<Py<PyAny>>,
         rays: Option<&Bound<PyAny>>,
         frame: &str,
+        precision: &str,
     ) -> PyResult<Self> {
-        let objects = self::triangles(triangles)?;
+        let objects = self::triangles(triangles, Precision::read(precision)?)?;
         let limits = Limits { seconds, work, progress };
         let rays = &segments(rays)?;
         let frame = frames(frame)?;
@@ -150,7 +155,8 @@ impl Tree {
     }
 
     /// Loads the tree in a file. The mesh, triangles or boxes must be the ones that it was saved for.
-    /// With `vertices` and `faces`, `update` moves the vertices later.
+    /// With `vertices` and `faces`, `update` moves the vertices later. `precision` is that of the saved
+    /// tree.
     ///
     /// >>> import tempfile
     /// >>> folder = tempfile.TemporaryDirectory()
@@ -158,7 +164,7 @@ impl Tree {
     /// >>> Tree.load(folder.name + "/scene.bvh", triangles=[[[0, 0, 0], [1, 0, 0], [0, 1, 0]]])
     /// <Tree of 1 nodes over 1 objects>
     #[staticmethod]
-    #[pyo3(signature = (path, *, triangles = None, boxes = None, vertices = None, faces = None))]
+    #[pyo3(signature = (path, *, triangles = None, boxes = None, vertices = None, faces = None, precision = "single"))]
     fn load(
         py: Python,
         path: PathBuf,
@@ -166,15 +172,17 @@ impl Tree {
         boxes: Option<&Bound<PyAny>>,
         vertices: Option<&Bound<PyAny>>,
         faces: Option<&Bound<PyAny>>,
+        precision: &str,
     ) -> PyResult<Self> {
+        let precision = Precision::read(precision)?;
         let mut corners = None;
         let objects = match (triangles, boxes, vertices, faces) {
-            (Some(triangles), None, None, None) => self::triangles(triangles)?,
+            (Some(triangles), None, None, None) => self::triangles(triangles, precision)?,
             (None, Some(boxes), None, None) => self::boxes(boxes)?,
             (None, None, Some(vertices), Some(faces)) => {
-                let (triangles, faces) = mesh(MESH, vertices, faces)?;
+                let (objects, faces) = mesh_objects(vertices, faces, precision)?;
                 corners = Some(Arc::new(faces));
-                shapes(triangles)
+                objects
             }
             _ => {
                 let accepted = "one of triangles, boxes, and vertices with faces";
@@ -249,9 +257,9 @@ impl Tree {
             let accepted = "a tree of vertices and faces, from Tree.from_mesh or Tree.load";
             return Err(invalid(format!("the tree has no faces; accepted: {accepted}")));
         };
-        let objects = moved_mesh(vertices, faces)?;
         let _improving = self.improver.begin()?;
         let owned = self.owned();
+        let objects = moved_mesh(vertices, faces, Precision::of_tree(&owned))?;
         let py = vertices.py();
         // A copy is moved, because the tree must not be locked while another thread may fork.
         let moved = py
@@ -279,6 +287,19 @@ impl Tree {
             }
         };
         Ok(self.owned().cost(objective))
+    }
+
+    /// The numbers of the triangles' coordinates: `single`, `float32`, as those of all boxes, or
+    /// `double`, `float64`.
+    ///
+    /// >>> square.precision
+    /// 'single'
+    #[getter]
+    fn precision(&self) -> &'static str {
+        match Precision::of_tree(&self.owned()) {
+            Precision::Single => "single",
+            Precision::Double => "double",
+        }
     }
 
     /// What the search chose by itself, and why: one line each. A loaded tree has none.

@@ -105,7 +105,8 @@ def test_forged_pickles_are_refused():
         ((shape, objects, file, faces[1:]), "^faces has 11 bytes; accepted: multiples of 12$"),
         ((*boxes[:3], faces), "^faces has 1 faces; accepted: 0, as objects$"),
         ((shape, objects + bytes(12), file, faces), "^objects has 48 bytes; accepted: multiples of 36$"),
-        (("spheres", objects, file, None), '^shape is "spheres"; accepted: triangles, boxes$'),
+        (("doubles", bytes(64) + np.float64(np.nan).tobytes(), file, None), "^objects: triangle 0 has the corner .*2\\^-150 to 2\\^120$"),
+        (("spheres", objects, file, None), '^shape is "spheres"; accepted: triangles, doubles, boxes$'),
         ((shape, objects, file[:-1], None), "^tree: "),
     ]:
         with pytest.raises(ValueError, match=message):
@@ -117,12 +118,13 @@ def test_forged_pickles_are_refused():
     ("vertices", "indices", "message"),
     [
         (np.ones((12, 3)), np.arange(12).reshape(3, 4), r"^triangle_indices has shape \(3, 4\); accepted: \(n, 3\)$"),
-        (np.ones((9, 4)), np.arange(9).reshape(3, 3), r"^vertex_positions has shape \(9, 4\); accepted: \(v, 3\)$"),
+        (np.ones((9, 4)), np.arange(9).reshape(3, 3), r"^vertex_positions has shape \(9, 4\); accepted: \(..., 3\)$"),
         (CORNERS, [[0.9, 1.2, 2.7]], "^triangle_indices has dtype float64; accepted: integers$"),
         (CORNERS, [[0, 1, -1]], "^triangle_indices: face 0 names vertex -1; accepted: indices below 3$"),
         (CORNERS, [[0, 1, 3]], "^triangle_indices: face 0 names vertex 3; accepted: indices below 3$"),
         (np.array(CORNERS) + 0j, FACE, "^vertex_positions has dtype complex128; accepted: real numbers$"),
-        (NAN, FACE, "^vertex_positions: vertex 0 of face 0 is .*; accepted: finite numbers of float32, up to 3.4e38$"),
+        (NAN, FACE, r"^vertex_positions: vertex 0 of face 0 is \[0.0, 0.0, NaN\]; accepted: 0 or 2\^-150 to 2\^120 in size$"),
+        (np.float32(NAN), FACE, "^vertex_positions: vertex 0 of face 0 is .*; accepted: finite numbers of float32, up to 3.4e38$"),
     ],
 )
 def test_scenes_refuse_what_trees_of_meshes_refuse(vertices, indices, message):
@@ -178,8 +180,6 @@ def test_scenes_accept_rays_of_any_leading_shape():
     [
         (lambda: Tracer(mesh()).contains(CORNERS, by="rays"), '^by is "rays"; accepted: auto, parity, winding$'),
         (lambda: Tracer(mesh()).signed_distance(CORNERS, by=""), '^by is ""; accepted: auto, parity, winding$'),
-        (lambda: Tracer(mesh(), center=[0, 0]), r"^center has shape \(2,\); accepted: \(3,\)$"),
-        (lambda: Tracer(mesh(), center=[0, 0, np.inf]), r"^center is \[0, 0, inf\]; accepted: finite coordinates$"),
         (lambda: RaycastingScene().compute_occupancy(CORNERS, nsamples=2), "^nsamples is 2; accepted: odd numbers from 1$"),
         (lambda: RaycastingScene().compute_signed_distance(CORNERS, nsamples=0), "^nsamples is 0; accepted: odd"),
         (lambda: RaycastingScene().add_triangles(RaycastingScene()), "^add_triangles: found one RaycastingScene; accepted: "),
@@ -188,7 +188,7 @@ def test_scenes_accept_rays_of_any_leading_shape():
         (lambda: PINHOLE(60, [0, 0, 0], [0, 0, 5], [0, 0, 1], 2, 2), "^up is parallel to the view"),
     ],
 )
-def test_errors_of_insides_centers_and_cameras_name_the_argument(call, message):
+def test_errors_of_insides_and_cameras_name_the_argument(call, message):
     with pytest.raises((TypeError, ValueError), match=message):
         call()
 
@@ -201,13 +201,56 @@ HUGE = [[1e300, 0, 0], [1, 0, 0], [0, 1, 0]]
     ("call", "message"),
     [
         (lambda: Tree.from_mesh(HUGE, FACE, work=10), r"^vertices: vertex 0 of face 0 is \[1e300, 0.0, 0.0\]; accepted: .* 3.4e38$"),
-        (lambda: Tree.from_triangles([HUGE], work=10), "^triangles has 1e300; accepted: .* 3.4e38$"),
-        (lambda: Tree.from_boxes([[0, 0, 0, 1, 1, 1e300]], work=10), "^boxes has 1e300; accepted: .* 3.4e38$"),
-        (lambda: from_boxes(rays=[HUGE[:2]]), "^rays has 1e300; accepted: .* 3.4e38$"),
+        (lambda: Tree.from_triangles([HUGE], work=10), "^triangles has 1e300 in row 0; accepted: .* 3.4e38$"),
+        (lambda: Tree.from_boxes([[0, 0, 0, 1, 1, 1e300]], work=10), "^boxes has 1e300 in row 0; accepted: .* 3.4e38$"),
+        (lambda: from_boxes(rays=[HUGE[:2]]), "^rays has 1e300 in row 0; accepted: .* 3.4e38$"),
         (lambda: Tracer(mesh()).nearest(HUGE, CORNERS), r"^ray 0: the ray's origin is \[1e300, 0.0, 0.0\]; accepted: .* 3.4e38$"),
         (lambda: Tracer(mesh()).any(HUGE[1:], HUGE[:1]), r"^ray 0: the ray's direction is \[1e300, 0.0, 0.0\]; accepted: "),
     ],
 )
 def test_numbers_beyond_float32_are_named_as_they_were_given(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def double(**arguments):
+    return Tree.from_mesh(CORNERS, FACE, work=10, precision="double", **arguments)
+
+
+DOWN = [[0, 0, 5], [1, 0, 5]], [0, 0, -1]
+RANGE = r"accepted: 0 or 2\^-150 to 2\^120 in size"
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -2e36, 1e-46])
+def test_numbers_beyond_the_exact_range_are_named_with_the_range(number):
+    wrong = [[0, 0, 0], [1, 0, 0], [0, number, 0]]
+    name = repr(float(number)).replace("nan", "NaN").replace("+", "")
+    for call, message in [
+        (lambda: Tree.from_mesh(wrong, FACE, precision="double"), rf"^vertices: vertex 2 of face 0 is \[0.0, {name}, 0.0\]; {RANGE}$"),
+        (lambda: double().update(wrong), rf"^vertices: vertex 2 of face 0 is \[0.0, {name}, 0.0\]; {RANGE}$"),
+        (lambda: Tree.from_triangles([CORNERS, wrong], precision="double"), f"^triangles has {name} in row 1; {RANGE}$"),
+        (lambda: Tracer(double()).nearest(wrong, DOWN[1]), rf"^ray 2: the ray's origin is \[0.0, {name}, 0.0\]; {RANGE}$"),
+        (lambda: Tracer(double()).all([0, 0, 1], [0, number, 1]), rf"^ray 0: the ray's direction is \[0.0, {name}, 1.0\]; {RANGE}, the largest from 2\^-100 to 2\^100$"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Tree.from_mesh(CORNERS, FACE, precision="half"), '^precision is "half"; accepted: single, double$'),
+        (lambda: Tracer(mesh()).nearest(*DOWN, exclude=0), '^exclude: the tree is single; accepted: a tree with precision="double"$'),
+        (lambda: Tracer(mesh()).any(*DOWN, orientation="exiting"), '^orientation: the tree is single; accepted: a tree with precision="double"$'),
+        (lambda: Tracer(double()).any(*DOWN, orientation="inward"), '^orientation is "inward"; accepted: any, exiting, entering$'),
+        (lambda: Tracer(double()).nearest(*DOWN, exclude=[0, 1]), "^exclude has 1; accepted: indices below 1, or -1$"),
+        (lambda: Tracer(double()).nearest(*DOWN, exclude=-2), "^exclude has -2; accepted: indices below 1, or -1$"),
+        (lambda: Tracer(double()).nearest(*DOWN, exclude=[0]), r"^exclude has shape \(1,\); accepted: one index, \(2,\) or \(2, k\), as origins$"),
+        (lambda: Tracer(double()).any(*DOWN, exclude=[[[0]], [[0]]]), r"^exclude has shape \(2, 1, 1\); accepted: "),
+        (lambda: Tracer(double()).any(*DOWN, exclude=[0.0, 1.0]), "^exclude has dtype float64; accepted: integers$"),
+        (lambda: double().export("json"), "accepted: a tree of a bake with the file's frame$"),
+    ],
+)
+def test_errors_of_precisions_and_selections_name_the_argument(call, message):
     with pytest.raises(ValueError, match=message):
         call()

@@ -24,6 +24,7 @@ SCENE_RAYS = {"rays": np.concatenate([ORIGINS, DIRECTIONS], axis=1).reshape(1, C
 POINTS = {"query_points": ORIGINS.reshape(1, COUNT, 3)}
 TRIMESH_RAYS = {"ray_origins": ORIGINS, "ray_directions": DIRECTIONS}
 TREE = Tree.from_mesh(VERTICES, FACES, work=1000)
+DOUBLE = Tree.from_mesh(VERTICES, FACES, work=1000, precision="double")
 
 
 def trees(make):
@@ -101,16 +102,16 @@ CALLS = {
         f"RayMeshIntersector.{name}": (of_trimesh(name), TRIMESH_RAYS)
         for name in ("intersects_id", "intersects_location", "intersects_first", "intersects_any")
     },
-    "Tracer of a center": (
-        lambda center: Tracer(TREE, center=center).nearest(ORIGINS, DIRECTIONS),
-        {"center": np.array([0.5, 0.25, -0.25])},
-    ),
+    **{
+        f"Tracer.{name} of a double tree": (getattr(Tracer(DOUBLE), name), RAYS | {"exclude": RANDOM.integers(-1, 20, (COUNT, 2))})
+        for name in ("nearest", "any")
+    },
     "RayMeshIntersector.contains_points": (of_trimesh("contains_points"), {"points": ORIGINS}),
 }
 
 # Parameters that are no arrays of numbers.
 OTHERS = {"self", "seconds", "references", "seed", "work", "progress", "path", "kind", "coherent", "invalid", "tracer"}
-OTHERS |= {"by", "frame", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
+OTHERS |= {"precision", "orientation", "by", "frame", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
 
 
 def unaligned(array):

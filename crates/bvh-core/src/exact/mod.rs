@@ -162,9 +162,11 @@ impl Line {
         ([cross(c, b), cross(a, c), cross(b, a)], error * (spread + error))
     }
 
-    /// Returns the edge values, computed in f64 and multiplied by `d_z`.
-    pub(crate) fn weights<P: Point>(&self, triangle: &[P; 3]) -> [f64; 3] {
-        self.edges(&self.relative(triangle)).0
+    /// Returns the weights of the corners where the line meets the triangle's plane, if it does.
+    pub(crate) fn barycentrics<P: Point>(&self, triangle: &[P; 3]) -> Option<[f64; 3]> {
+        let (weights, _) = self.edges(&self.relative(triangle));
+        let sum: f64 = weights.iter().sum();
+        (sum != 0.0).then(|| weights.map(|weight| weight / sum))
     }
 
     /// Decides in f64 if the error bounds permit.

@@ -149,7 +149,7 @@ impl DWideBvh {
         hits
     }
 
-    fn hit_of(&self, ray: &DRay, object: u32) -> Option<DHit> {
+    pub(super) fn hit_of(&self, ray: &DRay, object: u32) -> Option<DHit> {
         let t = self.triangles[object as usize].crossing(ray)?;
         Some(DHit { t, object })
     }

@@ -58,6 +58,34 @@ impl DWideBvh {
         }
     }
 
+    /// Appends [all hits](Self::all_hits) of every ray to `hits`, ray after ray, and writes the number
+    /// of hits of each ray.
+    ///
+    /// # Panics
+    /// Panics if `rays` and `counts` are not equally many.
+    pub fn all_hits_of(&self, rays: &[DRay], hits: &mut Vec<DHit>, counts: &mut [u32]) {
+        assert_eq!(rays.len(), counts.len(), "a count for every ray");
+        counts.fill(0);
+        for (part, counts) in self.parts(rays, Select::default()).zip(counts.chunks_mut(AT_ONCE)) {
+            let (mut numbers, mut found) = (Vec::new(), Vec::new());
+            let all = All { part, numbers: &mut numbers, found: &mut found };
+            self.wide.trace(all, Coherence::Incoherent);
+            let rays: Vec<DRay> = numbers.iter().map(|&number| part.rays[number]).collect();
+            self.resolve(&rays, &mut found);
+            // No distance is negative or −0, so distances are ordered as their bits are.
+            let key =
+                |(&number, hit): (&usize, &NearestHit)| (number, hit.low.to_bits(), hit.object);
+            let mut sorted: Vec<_> = numbers.iter().zip(&found).map(key).collect();
+            sorted.sort_unstable();
+            // A divided triangle is hit in several leaves, every time at the same distance.
+            sorted.dedup();
+            for (number, t, object) in sorted {
+                counts[number] += 1;
+                hits.push(DHit { t: f64::from_bits(t), object });
+            }
+        }
+    }
+
     fn parts<'a>(&'a self, rays: &'a [DRay], select: Select<'a>) -> impl Iterator<Item = Part<'a>> {
         let excluded = select.exclude.len().checked_div(rays.len()).unwrap_or(0);
         assert_eq!(select.exclude.len(), excluded * rays.len(), "ids to exclude for every ray");
@@ -331,5 +359,64 @@ impl<'a, const PLAIN: bool> Find for Any<'a, PLAIN> {
         let query = self.part.query(number);
         let mut nearest = NearestHit::new(query.ray);
         self.hits[number] = self.part.layout.search::<ANY_HIT>(query, &mut nearest);
+    }
+}
+
+/// All hits of every ray, in no order; those of a divided triangle once for each of its leaves.
+struct All<'a> {
+    part: Part<'a>,
+    /// The rays of the hits.
+    numbers: &'a mut Vec<usize>,
+    found: &'a mut Vec<NearestHit>,
+}
+
+impl All<'_> {
+    fn take(&mut self, number: usize, hit: DHit) {
+        let (t, nearest) = (hit.t, NearestHit::new(&self.part.rays[number]));
+        self.numbers.push(number);
+        self.found.push(nearest.other((t, t), hit.object));
+    }
+}
+
+impl<'a> Find for All<'a> {
+    type Rays = DRays<'a>;
+    const ALL: bool = true;
+    const DECIDES: bool = true;
+
+    #[inline(always)]
+    fn rays(&self) -> DRays<'a> {
+        self.part.rays()
+    }
+
+    #[inline(always)]
+    unsafe fn decide<K: Instructions>(
+        &mut self,
+        number: usize,
+        block: &TriangleBlock,
+        Bounded { possible, certain, .. }: &Bounded,
+    ) -> Option<Hit> {
+        let Part { layout, rays, .. } = self.part;
+        let ray = &rays[number];
+        // SAFETY: the processor has the instructions.
+        let mut lanes = possible & unsafe { block.used::<K::Block>() };
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & 3;
+            lanes &= lanes - 1;
+            if certain >> lane & 1 == 0 {
+                let hit = layout.hit_of(ray, block.id(lane));
+                hit.into_iter().for_each(|hit| self.take(number, hit));
+            } else {
+                // It crosses no edge, in the ray's range, at a distance that is not known yet.
+                let unknown = (0.0, f64::INFINITY);
+                self.numbers.push(number);
+                self.found.push(NearestHit::new(ray).other(unknown, block.id(lane)));
+            }
+        }
+        None
+    }
+
+    fn alone(&mut self, _: &WideBvh, number: usize) {
+        let hits = self.part.layout.all_hits(&self.part.rays[number]);
+        hits.into_iter().for_each(|hit| self.take(number, hit));
     }
 }

@@ -284,6 +284,10 @@ fn every_kernel_finds_all_hits_closest_points_and_insides_as_all_triangles_toget
                     solid.contains(&layout, &points, InsideRule::Auto, &mut inside);
                     assert_eq!(inside, parities, "{name}, {kernel:?}");
                 }
+                let (mut found, mut counts) = (vec![], vec![0; rays.len()]);
+                layout.all_hits_of(&rays, &mut found, &mut counts);
+                assert_eq!(found, expected.concat(), "{name}, {kernel:?}");
+                assert!(counts.iter().zip(&expected).all(|(&n, all)| n as usize == all.len()));
                 for ((ray, all), &point) in rays.iter().zip(&expected).zip(&points) {
                     assert_eq!(&layout.all_hits(ray), all, "{name}, {kernel:?}, {ray:?}");
                     let found = layout.closest_point(point).unwrap();

@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from ._numbers import Numbers, Progress
 
-__all__ = ["Tracer", "Tree", "__version__", "corners", "locations", "rows"]
+__all__ = ["Tracer", "Tree", "__version__", "corners", "rows"]
 
 __version__: str
 
 _Invalid = Literal["error", "miss"]
+_Orientation = Literal["any", "exiting", "entering"]
+_Precision = Literal["single", "double"]
+_Real = np.float32 | np.float64
 _Rule = Literal["auto", "parity", "winding"]
 
 @final
@@ -32,7 +35,9 @@ class Tree:
     times per second with the elapsed time and the lowest cost so far; if it raises an exception,
     the search ends. `rays` are recorded rays of the shape `(m, 2, 3)`, from their origins to their
     hits: the tree is then for rays like these. `references` above 1, up to 16, divides triangles
-    among leaves, on average into that many parts each; 1 keeps them whole.
+    among leaves, on average into that many parts each; 1 keeps them whole. With
+    `precision="double"` the triangles have `float64` coordinates, each 0 or 2^-150 to 2^120 in size,
+    and `Tracer` answers in `float64`.
 
     >>> from bvh_search import Tree
     >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -53,6 +58,7 @@ class Tree:
         progress: Progress | None = None,
         rays: Numbers | None = None,
         frame: Literal["auto", "file"] = "auto",
+        precision: _Precision = "single",
     ) -> Tree:
         """Searches for the best tree over the triangles of a mesh: vertices, `(v, 3)`, and faces, `(n,
         3)`, of three vertices each. `update` moves the vertices later. The boxes lie along other
@@ -71,6 +77,7 @@ class Tree:
         progress: Progress | None = None,
         rays: Numbers | None = None,
         frame: Literal["auto", "file"] = "auto",
+        precision: _Precision = "single",
     ) -> Tree:
         """Searches for the best tree over triangles, `(n, 3, 3)`.
 
@@ -98,9 +105,11 @@ class Tree:
         boxes: Numbers | None = None,
         vertices: Numbers | None = None,
         faces: Numbers | None = None,
+        precision: _Precision = "single",
     ) -> Tree:
         """Loads the tree in a file. The mesh, triangles or boxes must be the ones that it was saved for.
-        With `vertices` and `faces`, `update` moves the vertices later.
+        With `vertices` and `faces`, `update` moves the vertices later. `precision` is that of the saved
+        tree.
 
         >>> import tempfile
         >>> folder = tempfile.TemporaryDirectory()
@@ -148,6 +157,14 @@ class Tree:
         True
         """
     @property
+    def precision(self) -> _Precision:
+        """The numbers of the triangles' coordinates: `single`, `float32`, as those of all boxes, or
+        `double`, `float64`.
+
+        >>> square.precision
+        'single'
+        """
+    @property
     def reasons(self) -> list[str]:
         """What the search chose by itself, and why: one line each. A loaded tree has none.
 
@@ -185,18 +202,21 @@ class Tracer:
     tree do not change the tracer.
 
     Rays have `origins` and `directions` of the shape `(m, 3)`; one of the shape `(3,)` or `(1, 3)` is
-    for all rays. `t_min` and `t_max`, by default 0
-    and infinity, are one number or have the shape `(m,)`; those in `float64` are rounded inwards.
-    Distances are in multiples of the directions' lengths. `coherent` tells whether consecutive rays
-    begin close to each other and have similar directions; by default a look at the rays decides. It
-    changes the speed and no answer. An invalid ray, with a direction that is zero or a number that
+    for all rays. `t_min` and `t_max`, by default 0 and infinity, are one number or have the shape
+    `(m,)`. Distances are in multiples of the directions' lengths. `coherent` tells whether consecutive
+    rays begin close to each other and have similar directions; by default a look at the rays decides.
+    It changes the speed and no answer. An invalid ray, with a direction that is zero or a number that
     is not finite, raises a `ValueError`; with `invalid="miss"` it hits nothing.
 
-    Trees have `float32` coordinates. For coordinates that need `float64`, move the triangles by
-    `-center` before they are rounded, and pass `center`: rays, points and answers are then in the
-    coordinates of the world, and only what is left after their move is rounded. A ray that begins
-    outside the tree's box, far away or at a point that `float32` does not have, is first advanced to
-    it in `float64`.
+    The tracer of a tree with `precision="double"` answers in `float64`, exactly, however far the
+    triangles and the rays are from the origin. Coordinates are 0 or 2^-150 to 2^120 in size; with
+    `invalid="miss"`, what is smaller in a ray counts as 0. In other tracers, rays and points are
+    rounded to `float32`, and `t_min` and `t_max` inwards.
+
+    `nearest` and `any` choose which triangles count, in trees with `precision="double"`: those with
+    the `orientation` `"exiting"`, which the ray meets along their normal as where it leaves a solid,
+    `"entering"`, against it, or `"any"`, and none of the indices `exclude`. That is one index,
+    an array `(m,)` or `(m, k)` of some for each ray; -1 excludes nothing.
 
     Ctrl-C ends every call. `progress(seconds, fraction)` is called about twenty times per second with
     the elapsed time and the part of the rays or points that is answered, and at the end with 1; if it
@@ -209,7 +229,7 @@ class Tracer:
     >>> tracer = Tracer(square)
     """
 
-    def __new__(cls, tree: Tree, *, center: Numbers | None = None) -> Tracer: ...
+    def __new__(cls, tree: Tree) -> Tracer: ...
     @property
     def watertight(self) -> bool:
         """Whether the mesh has no holes: every edge runs as often in one direction as in the other, or
@@ -225,10 +245,12 @@ class Tracer:
         t_min: Numbers | None = None,
         t_max: Numbers | None = None,
         *,
+        orientation: _Orientation = "any",
+        exclude: Numbers | None = None,
         coherent: bool | None = None,
         invalid: _Invalid = "error",
         progress: Progress | None = None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    ) -> tuple[NDArray[_Real], NDArray[np.int32]]:
         """Returns the distances of the nearest hits and the triangles' indices. A ray without a hit
         has infinity and −1.
 
@@ -242,6 +264,8 @@ class Tracer:
         t_min: Numbers | None = None,
         t_max: Numbers | None = None,
         *,
+        orientation: _Orientation = "any",
+        exclude: Numbers | None = None,
         coherent: bool | None = None,
         invalid: _Invalid = "error",
         progress: Progress | None = None,
@@ -260,7 +284,7 @@ class Tracer:
         *,
         invalid: _Invalid = "error",
         progress: Progress | None = None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
+    ) -> tuple[NDArray[_Real], NDArray[np.int32], NDArray[np.int64]]:
         """Returns all hits, ray after ray and the nearest first: distances, triangles, and the indices
         of the rays. Each crossing of the surface counts once, although triangles share edges and
         corners, so the number of hits of a line with a closed mesh is even.
@@ -318,7 +342,7 @@ class Tracer:
         """
     def surface(
         self, origins: Numbers, directions: Numbers, triangle: Numbers
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[_Real]]:
         """Returns the weights `u` and `v` of the second and third corner at hits, and the unit normals
         of the triangles, on the side from which their corners run counterclockwise. `triangle` has
         one index per ray; where it is −1 all numbers are 0.
@@ -328,16 +352,9 @@ class Tracer:
         """
     def __len__(self) -> int: ...
 
-def corners(vertex_positions: Numbers, triangle_indices: Numbers) -> NDArray[np.float64]:
-    """Returns the corners, `(n, 3, 3)` in `float64`, of the triangles of a mesh, with the checks of
-    `Tree.from_mesh`.
-    """
-def locations(
-    triangles: Numbers, origins: Numbers, directions: Numbers, triangle: Numbers, ray: Numbers
-) -> NDArray[np.float64]:
-    """Returns the points, in `float64`, where rays cross triangles: the indices of triangles and rays
-    are from `Tracer.all`. `triangles` has the shape `(n, 3, 3)`. Each point is in the box of its
-    triangle.
+def corners(vertex_positions: Numbers, triangle_indices: Numbers) -> NDArray[_Real]:
+    """Returns the corners, `(n, 3, 3)`, of the triangles of a mesh, with the checks of
+    `Tree.from_mesh`: in `float32` if the vertices are, and otherwise in `float64`.
     """
 def rows(name: str, argument: Numbers, length: int) -> NDArray[Any]:
     """Converts the argument called `name` to `float32` or `float64` and checks that its last axis has

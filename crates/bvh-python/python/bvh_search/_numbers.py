@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 
 class Tensor(Protocol):
@@ -16,3 +17,12 @@ class Tensor(Protocol):
 Numbers = ArrayLike | Tensor
 # Called with the elapsed seconds and a state.
 Progress = Callable[[float, float], object]
+
+# The least size of a number but 0 in a tree with precision="double".
+_LEAST = 2.0**-150
+
+
+def without_tiny(numbers: NDArray[Any]) -> NDArray[Any]:
+    """Returns 0 for what is too small for a tree with precision="double"."""
+    is_least: NDArray[np.bool_] = np.abs(numbers) >= _LEAST
+    return numbers * is_least

@@ -1,13 +1,12 @@
 """A scene with the method names of Open3D's `RaycastingScene`."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._bvh_search import Tracer, Tree, corners, rows
-from ._center import center_of, check_rounding
-from ._numbers import Numbers, Progress
+from ._numbers import Numbers, Progress, without_tiny
 
 __all__ = ["Answer", "RaycastingScene"]
 
@@ -47,9 +46,9 @@ class RaycastingScene:
     have the same leading shape. They are tensors of Open3D if the rays or points are, and otherwise
     numpy arrays with the methods `numpy`, `cpu` and `isfinite` of those tensors. Geometries are numbered in the order of `add_triangles`.
     The tree is found at the first query, in about `seconds`. Arrays of other shapes, and meshes that
-    `Tree.from_mesh` would refuse, raise a `ValueError`. Coordinates may be `float64`: scenes far from
-    zero are moved to it before they are rounded, and rays that begin far away are advanced to them.
-    Meshes so far apart that rounding would change the shape of one raise a `ValueError`.
+    `Tree.from_mesh` would refuse, raise a `ValueError`. If the vertices of any mesh are `float64`, all
+    queries are answered in it, exactly, however far from the origin; numbers below 2^-150 count as 0.
+    Answers are `float32`, as those of Open3D.
 
     Ctrl-C ends every query, and `progress(seconds, fraction)` follows it as it does those of `Tracer`.
     `nthreads` is accepted for compatibility: all threads answer.
@@ -66,7 +65,7 @@ class RaycastingScene:
 
     def __init__(self, seconds: float = 1.0, *, nthreads: int = 0) -> None:
         self._seconds = seconds
-        self._triangles: list[NDArray[np.float64]] = []
+        self._triangles: list[NDArray[Any]] = []
         self._made: tuple[Tracer, NDArray[np.int64]] | None = None
 
     def add_triangles(self, vertex_positions: Any, triangle_indices: Numbers | None = None) -> int:
@@ -78,20 +77,19 @@ class RaycastingScene:
         """
         if triangle_indices is None:
             vertex_positions, triangle_indices = _parts_of(vertex_positions)
-        self._triangles.append(corners(vertex_positions, triangle_indices))
+        vertices = without_tiny(rows("vertex_positions", vertex_positions, 3))
+        self._triangles.append(corners(vertices, triangle_indices))
         self._made = None
         return len(self._triangles) - 1
 
     def _scene(self) -> tuple[Tracer, NDArray[np.int64]]:
         if self._made is None:
-            triangles = np.concatenate([np.empty((0, 3, 3)), *self._triangles])
-            center = center_of(triangles)
-            triangles -= center
+            triangles = np.concatenate([np.empty((0, 3, 3), np.float32), *self._triangles])
             first = np.cumsum([0] + [len(part) for part in self._triangles])
-            for geometry, part in enumerate(np.split(triangles, first[1:-1])):
-                check_rounding(f"geometry {geometry}", part)
-            tracer = Tracer(Tree.from_triangles(triangles, self._seconds), center=center)
-            self._made = tracer, first
+            is_double = triangles.dtype == np.float64
+            precision: Literal["single", "double"] = "double" if is_double else "single"
+            tree = Tree.from_triangles(triangles, self._seconds, precision=precision)
+            self._made = Tracer(tree), first
         return self._made
 
     @staticmethod
@@ -125,11 +123,11 @@ class RaycastingScene:
         u, v, normals = tracer.surface(origins, directions, triangle)
         geometry, primitive = self._ids(triangle, first)
         answers = {
-            "t_hit": t.reshape(shape),
+            "t_hit": t.astype(np.float32).reshape(shape),
             "geometry_ids": geometry.reshape(shape),
             "primitive_ids": primitive.reshape(shape),
             "primitive_uvs": np.stack([u, v], axis=-1).astype(np.float32).reshape((*shape, 2)),
-            "primitive_normals": normals.reshape((*shape, 3)),
+            "primitive_normals": normals.astype(np.float32).reshape((*shape, 3)),
         }
         return _answers(rays, answers)
 
@@ -182,7 +180,7 @@ class RaycastingScene:
         answers: dict[str, NDArray[Any]] = {
             "ray_splits": np.searchsorted(ray, np.arange(len(origins) + 1)).astype(np.uint32),
             "ray_ids": ray.astype(np.uint32),
-            "t_hit": t,
+            "t_hit": t.astype(np.float32),
             "geometry_ids": geometry,
             "primitive_ids": primitive,
             "primitive_uvs": np.stack([u, v], axis=-1).astype(np.float32),
@@ -215,7 +213,7 @@ class RaycastingScene:
             "geometry_ids": geometry.reshape(shape),
             "primitive_ids": primitive.reshape(shape),
             "primitive_uvs": np.stack([u, v], axis=-1).astype(np.float32).reshape((*shape, 2)),
-            "primitive_normals": normals.reshape((*shape, 3)),
+            "primitive_normals": normals.astype(np.float32).reshape((*shape, 3)),
         }
         return _answers(query_points, answers)
 

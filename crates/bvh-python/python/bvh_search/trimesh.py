@@ -14,9 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._bvh_search import Tracer, Tree, locations
-from ._center import center_of
-from ._numbers import Progress
+from ._bvh_search import Tracer, Tree
+from ._numbers import Progress, without_tiny
 
 __all__ = ["RayMeshIntersector"]
 
@@ -43,16 +42,14 @@ class _Mesh(Protocol):
     def vertices(self) -> Any: ...
     @property
     def faces(self) -> Any: ...
-    @property
-    def triangles(self) -> Any: ...
 
 
 class RayMeshIntersector:
     """Answers the ray queries of trimesh, with the names and results of its own engines.
 
     All hits of a ray count each crossing of the surface once, also through edges and corners. Rays
-    whose direction is zero or not finite hit nothing. Rays may begin far away: they are advanced to
-    the mesh in `float64`, and locations are in `float64`. The tree is found at the first query, in about
+    whose direction is zero or not finite hit nothing. Vertices and rays are in `float64`, and answers
+    exact, however far from the origin; numbers below 2^-150 count as 0. The tree is found at the first query, in about
     `seconds`, and again after the mesh has changed. Ctrl-C ends every query, and
     `progress(seconds, fraction)` follows it as it does those of `Tracer`.
     """
@@ -76,12 +73,9 @@ class RayMeshIntersector:
             seconds = self._seconds
             if seconds is None:
                 seconds = min(1.0, 1e-6 * len(faces))
-            # A vertex that no face uses may be anywhere.
-            is_used = np.isin(np.arange(len(vertices)), faces)
-            center = center_of(vertices[is_used])
             _collect(len(faces))
-            tree = Tree.from_mesh(vertices - center, faces, seconds=seconds)
-            self._made = state, Tracer(tree, center=center)
+            tree = Tree.from_mesh(without_tiny(vertices), faces, seconds=seconds, precision="double")
+            self._made = state, Tracer(tree)
         return self._made[1]
 
     @staticmethod
@@ -128,20 +122,20 @@ class RayMeshIntersector:
         """
         rays = self._rays(ray_origins, ray_directions)
         if multiple_hits:
-            _, index_tri, index_ray = self._tracer().all(*rays, invalid="miss", progress=progress)
+            t, index_tri, index_ray = self._tracer().all(*rays, invalid="miss", progress=progress)
             # A ray has more hits if the hit so many places later is its own, too.
             if (index_ray[max_hits:] == index_ray[: max(len(index_ray) - max_hits, 0)]).any():
                 first = np.searchsorted(index_ray, index_ray)
                 kept = np.arange(len(index_ray)) - first < max_hits
-                index_tri, index_ray = index_tri[kept], index_ray[kept]
+                t, index_tri, index_ray = t[kept], index_tri[kept], index_ray[kept]
         else:
-            _, index_tri = self._tracer().nearest(*rays, invalid="miss", progress=progress)
+            t, index_tri = self._tracer().nearest(*rays, invalid="miss", progress=progress)
             index_ray = np.nonzero(index_tri >= 0)[0]
-            index_tri = index_tri[index_ray]
+            t, index_tri = t[index_ray], index_tri[index_ray]
         if not return_locations:
             return index_tri.astype(np.int64), index_ray
-        corners = np.ascontiguousarray(self.mesh.triangles, dtype=np.float64).view(np.ndarray)
-        found = locations(corners, *rays, index_tri, index_ray)
+        origins, directions = (vectors.take(index_ray, axis=0) for vectors in rays)
+        found = origins + t[:, None] * directions
         return index_tri.astype(np.int64), index_ray, found
 
     def intersects_first(
@@ -170,8 +164,7 @@ class RayMeshIntersector:
         self, points: ArrayLike, *, progress: Progress | None = None
     ) -> NDArray[np.bool_]:
         """Returns whether each point is inside the mesh, by `Tracer.contains`: also for meshes that
-        overlap themselves, and by the generalised winding number for meshes with holes. Vertices and
-        points are rounded to `float32`, next to the middle of a mesh that is far from zero.
+        overlap themselves, and by the generalised winding number for meshes with holes.
 
         >>> mesh.ray.contains_points([[0, 0, 0.25], [0, 0, 1]])
         array([ True, False])

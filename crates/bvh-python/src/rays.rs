@@ -1,0 +1,247 @@
+//! Reads the arrays of rays and points, and which triangles count for each ray.
+
+use crate::arrays::{Array, invalid, numbers};
+use crate::precision::{Precision, Real};
+use bvh_search::bvh_core::glam::DVec3;
+use bvh_search::bvh_core::{DRay, Orientation, Select, Traced};
+use pyo3::prelude::*;
+
+/// Reads points, `(m, 3)`.
+pub fn points<N: Real>(argument: &Bound<PyAny>) -> PyResult<Vec<<N::Layout as Traced>::Point>> {
+    let points = Vectors::read("points", argument, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
+    let slice = points.slice()?;
+    Ok((0..points.len()).map(|index| N::point(slice.at(index))).collect())
+}
+
+/// Points or directions in either precision, without a copy of the array.
+pub enum Vectors<'py> {
+    Single(Array<'py, f32>),
+    Double(Array<'py, f64>),
+}
+
+impl<'py> Vectors<'py> {
+    pub fn read(
+        name: &str,
+        argument: &Bound<'py, PyAny>,
+        accepted: &str,
+        accepts: impl Fn(&[usize]) -> bool,
+    ) -> PyResult<Self> {
+        match Precision::of(argument) {
+            Precision::Single => numbers(name, argument, accepted, accepts).map(Self::Single),
+            Precision::Double => numbers(name, argument, accepted, accepts).map(Self::Double),
+        }
+    }
+
+    pub fn into_numpy(self) -> Bound<'py, PyAny> {
+        match self {
+            Self::Single(array) => array.into_numpy().into_any(),
+            Self::Double(array) => array.into_numpy().into_any(),
+        }
+    }
+
+    fn len(&self) -> usize {
+        let shape = match self {
+            Self::Single(array) => array.shape(),
+            Self::Double(array) => array.shape(),
+        };
+        shape.iter().product::<usize>() / 3
+    }
+
+    fn slice(&self) -> PyResult<VectorSlice<'_>> {
+        Ok(match self {
+            Self::Single(array) => VectorSlice::Single(array.elements()?.as_chunks().0),
+            Self::Double(array) => VectorSlice::Double(array.elements()?.as_chunks().0),
+        })
+    }
+}
+
+/// A vector for each index, or one for all.
+#[derive(Clone, Copy)]
+enum VectorSlice<'a> {
+    Single(&'a [[f32; 3]]),
+    Double(&'a [[f64; 3]]),
+}
+
+impl VectorSlice<'_> {
+    #[inline(always)]
+    fn at(self, index: usize) -> DVec3 {
+        match self {
+            Self::Single(vectors) => DVec3::from(at(vectors, index).map(f64::from)),
+            Self::Double(vectors) => DVec3::from(*at(vectors, index)),
+        }
+    }
+}
+
+/// Returns an element; the first one is for all later ones that are missing.
+#[inline(always)]
+fn at<T>(elements: &[T], index: usize) -> &T {
+    elements.get(index).unwrap_or(&elements[0])
+}
+
+/// The arrays of rays. Each has one element for all rays or one per ray.
+pub struct RayArrays<'py> {
+    pub rays: usize,
+    origins: Vectors<'py>,
+    directions: Vectors<'py>,
+    limits: [Vec<f64>; 2],
+    /// Whether an invalid ray hits nothing, instead of being an error.
+    misses: bool,
+}
+
+impl<'py> RayArrays<'py> {
+    /// Reads the arguments of a call. `invalid` is `error` or `miss`.
+    pub fn read(
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        [t_min, t_max]: [Option<&Bound<'py, PyAny>>; 2],
+        invalid: &str,
+    ) -> PyResult<Self> {
+        let misses = match invalid {
+            "error" => false,
+            "miss" => true,
+            _ => {
+                let message = format!("invalid is {invalid:?}; accepted: error, miss");
+                return Err(self::invalid(message));
+            }
+        };
+        let are_vectors = |shape: &[usize]| matches!(shape, [_, 3] | [3]);
+        let origins = Vectors::read("origins", origins, "(m, 3) or (3,)", are_vectors)?;
+        let accepted = match origins.len() {
+            1 => "(m, 3) or (3,)".to_owned(),
+            rays => format!("({rays}, 3), as origins, or (3,)"),
+        };
+        let directions = Vectors::read("directions", directions, &accepted, |shape| {
+            are_vectors(shape) && (origins.len() == 1 || matches!(shape, [3] | [1, 3]))
+                || shape == [origins.len(), 3]
+        })?;
+        let rays = if origins.len() == 1 { directions.len() } else { origins.len() };
+        let accepted = format!("a number or ({rays},), as origins");
+        let mut limits = [vec![0.0], vec![f64::INFINITY]];
+        for ((name, argument), limit) in
+            [("t_min", t_min), ("t_max", t_max)].into_iter().zip(&mut limits)
+        {
+            if let Some(argument) = argument {
+                // An array without axes is one number for all rays.
+                *limit = numbers::<f64>(name, argument, &accepted, |shape| {
+                    shape.is_empty() || shape == [rays]
+                })?
+                .elements()?
+                .to_vec();
+            }
+        }
+        Ok(Self { rays, origins, directions, limits, misses })
+    }
+
+    /// Returns the rays for threads without Python.
+    pub fn source(&self) -> PyResult<RaySource<'_>> {
+        Ok(RaySource {
+            origins: self.origins.slice()?,
+            directions: self.directions.slice()?,
+            limits: self.limits.each_ref().map(Vec::as_slice),
+            rays: self.rays,
+            misses: self.misses,
+        })
+    }
+}
+
+/// Rays in arrays.
+#[derive(Clone, Copy)]
+pub struct RaySource<'a> {
+    origins: VectorSlice<'a>,
+    directions: VectorSlice<'a>,
+    limits: [&'a [f64]; 2],
+    pub rays: usize,
+    misses: bool,
+}
+
+impl RaySource<'_> {
+    /// Returns the batch of this number, of batches of so many rays, or the fault of an invalid ray.
+    pub fn batch<N: Real>(&self, number: usize, size: usize) -> Result<Vec<N::Ray>, String> {
+        let mut rays = Vec::with_capacity(size.min(self.rays));
+        for index in (number * size..self.rays).take(size) {
+            let origin = self.origins.at(index);
+            let direction = self.directions.at(index);
+            let limits = self.limits.map(|limits| *at(limits, index));
+            rays.push(match N::ray(origin, direction, limits) {
+                Err(_) if self.misses => {
+                    // What is too small for a tree in `float64` is nothing next to what is not.
+                    let [origin, direction] = [origin, direction].map(without_least);
+                    let ray = N::ray(origin, direction, limits);
+                    // An empty range hits nothing.
+                    ray.or_else(|_| N::ray(DVec3::ZERO, DVec3::X, [1.0, 0.0]))?
+                }
+                ray => ray.map_err(|fault| format!("ray {index}: {fault}"))?,
+            });
+        }
+        Ok(rays)
+    }
+}
+
+fn without_least(vector: DVec3) -> DVec3 {
+    vector.map(|x| if x.abs() < DRay::LEAST { 0.0 } else { x })
+}
+
+/// Which triangles count for each ray.
+pub struct Selection {
+    orientation: Orientation,
+    /// The same number of ids for each ray, ray after ray.
+    excluded: Vec<u32>,
+    each: usize,
+}
+
+impl Selection {
+    /// Reads the arguments `orientation` and `exclude` of a call with so many rays, to a tree over so
+    /// many triangles.
+    pub fn read(
+        orientation: &str,
+        exclude: Option<&Bound<PyAny>>,
+        rays: usize,
+        (precision, triangles): (Precision, usize),
+    ) -> PyResult<Self> {
+        let sides = [
+            ("any", Orientation::Any),
+            ("exiting", Orientation::Exiting),
+            ("entering", Orientation::Entering),
+        ];
+        let Some((_, orientation)) = sides.into_iter().find(|side| side.0 == orientation) else {
+            let accepted = sides.map(|side| side.0).join(", ");
+            return Err(invalid(format!("orientation is {orientation:?}; accepted: {accepted}")));
+        };
+        let is_given = [orientation != Orientation::Any, exclude.is_some()];
+        for (name, is_given) in ["orientation", "exclude"].into_iter().zip(is_given) {
+            if is_given && precision == Precision::Single {
+                let accepted = "a tree with precision=\"double\"";
+                return Err(invalid(format!("{name}: the tree is single; accepted: {accepted}")));
+            }
+        }
+        let Some(exclude) = exclude else {
+            return Ok(Self { orientation, excluded: vec![], each: 0 });
+        };
+        let accepted = format!("one index, ({rays},) or ({rays}, k), as origins");
+        let ids = numbers::<i64>("exclude", exclude, &accepted, |shape| match *shape {
+            [] => true,
+            [found] | [found, _] => found == rays,
+            _ => false,
+        })?;
+        let id = |&id: &i64| match id {
+            // No triangle has this id.
+            -1 => Ok(u32::MAX),
+            0.. if (id as usize) < triangles => Ok(id as u32),
+            _ => Err(invalid(format!(
+                "exclude has {id}; accepted: indices below {triangles}, or -1"
+            ))),
+        };
+        let mut excluded = ids.elements()?.iter().map(id).collect::<PyResult<Vec<_>>>()?;
+        let each = if let [_, each] = *ids.shape() { each } else { 1 };
+        if ids.shape().is_empty() {
+            excluded = vec![excluded[0]; rays];
+        }
+        Ok(Self { orientation, excluded, each })
+    }
+
+    /// Returns what counts for the batch of this number, of batches of so many rays.
+    pub fn batch(&self, number: usize, size: usize, rays: usize) -> Select<'_> {
+        let exclude = &self.excluded[number * size * self.each..][..rays * self.each];
+        Select { orientation: self.orientation, exclude }
+    }
+}
