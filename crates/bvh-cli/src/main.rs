@@ -9,7 +9,6 @@ mod export;
 mod inspect;
 mod interrupt;
 mod memory;
-mod npy;
 mod orient;
 mod output;
 mod rays;

@@ -1,11 +1,7 @@
-//! Writes to the terminal, and the contents of files: tables and pictures.
+//! Writes to the terminal, and the contents of pictures.
 
-use crate::Error;
-use bvh_scenes::files::{self, WriteError};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde::Serialize;
 use std::io::{ErrorKind, Write};
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -62,22 +58,6 @@ pub fn answered(answer: &clap::Error) -> ExitCode {
     succeeded()
 }
 
-/// Writes rows as CSV to a file.
-pub fn write_table<R: Serialize>(
-    path: &Path,
-    columns: &str,
-    rows: impl Iterator<Item = R>,
-) -> Result<(), Error> {
-    let failed = |error: csv::Error| WriteError::of(path, "write the table")(error.into());
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns.split(',')).map_err(failed)?;
-    for row in rows {
-        writer.serialize(row).map_err(failed)?;
-    }
-    let table = writer.into_inner().map_err(|error| failed(error.into_error().into()))?;
-    Ok(files::write(path, &table)?)
-}
-
 /// Encodes pixels, row by row from the top, as a PNG file with the highest compression.
 pub fn png(width: u32, pixels: &[[u8; 3]]) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
@@ -108,12 +88,6 @@ fn plain(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    #[test]
-    fn control_characters_are_escaped() {
-        assert_eq!(super::plain("key \u{1b}[2J\nis 1"), "key \\u{1b}[2J\nis 1");
-        assert_eq!(super::plain("Müller–Fellner\n"), "Müller–Fellner\n");
-    }
-
     #[test]
     fn decoded_pixels_equal_the_encoded_ones() {
         let pixels = [[1, 2, 3], [255, 0, 128], [9, 9, 9], [0, 0, 0], [7, 70, 250], [4, 5, 6]];

@@ -136,7 +136,7 @@ struct Trial<'a> {
     divided: Option<Bvh>,
 }
 
-impl Bake<'_> {
+impl<'a> Bake<'a> {
     /// Makes the choices that are open. Takes the `greedy` tree if the caller has it. The choices
     /// are the same on every machine, for any number of threads; a clock of the observer is not
     /// read.
@@ -255,7 +255,14 @@ impl Bake<'_> {
             }
         }
         let parts = self.parts_of(greedy);
-        let mut trials = self.trials(&parts, greedy, most.references, &untimed)?;
+        let mut trials = Vec::new();
+        if parts.is_empty() {
+            trials.push(self.trial(Some(greedy.clone()), most.references, &untimed)?);
+        }
+        for (boxes, shapes) in &parts {
+            let part = Bake { boxes, shapes: shapes.as_ref(), ..*self };
+            trials.push(part.trial(None, most.references, &untimed)?);
+        }
         let mut best_tree = None;
         let mut tests: Vec<f64> = Vec::new();
         for (index, combination) in combinations.iter().enumerate() {
@@ -290,31 +297,16 @@ impl Bake<'_> {
         Ok(Some(1.0 - tests[place] / of_greedy))
     }
 
-    /// Prepares the trials of parts of the scene, or of the whole scene if there are none.
-    fn trials<'b>(
-        &'b self,
-        parts: &'b [(Vec<Aabb>, Option<Primitives>)],
-        greedy: &Bvh,
+    /// Prepares a trial. Builds the greedy tree unless there is one.
+    fn trial(
+        &self,
+        greedy: Option<Bvh>,
         references: f64,
         observer: &dyn Observer,
-    ) -> Result<Vec<Trial<'b>>, SearchError> {
-        let part = |(boxes, shapes): &'b (Vec<Aabb>, Option<Primitives>)| Bake {
-            boxes,
-            shapes: shapes.as_ref(),
-            ..*self
-        };
-        let mut bakes: Vec<Bake> = parts.iter().map(part).collect();
-        if parts.is_empty() {
-            bakes.push(*self);
-        }
-        let mut trials = Vec::new();
-        for bake in bakes {
-            let greedy =
-                if parts.is_empty() { Some(greedy.clone()) } else { bake.greedy(observer)? };
-            let divided = Bake { references, ..bake }.division(observer)?;
-            trials.push(Trial { bake, greedy, divided });
-        }
-        Ok(trials)
+    ) -> Result<Trial<'a>, SearchError> {
+        let greedy = if greedy.is_some() { greedy } else { self.greedy(observer)? };
+        let divided = Bake { references, ..*self }.division(observer)?;
+        Ok(Trial { bake: *self, greedy, divided })
     }
 
     /// Returns the boxes and the shapes of parts from all over a large scene, each a subtree of the

@@ -233,20 +233,17 @@ impl Scene<'_> {
         candidates: Vec<DQuat>,
         sample: &[Triangle],
     ) -> Option<()> {
-        let tried: Vec<Option<DQuat>> = candidates.iter().copied().map(Some).collect();
-        ranked.extend(self.prices(sample, &tried)?.into_iter().zip(candidates));
+        let prices = parallel::map(candidates.clone(), |tried| self.price(sample, Some(tried)));
+        if self.observer.cancelled() {
+            return None;
+        }
+        ranked.extend(prices.into_iter().zip(candidates));
         ranked.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         ranked.truncate(KEPT);
         Some(())
     }
 
-    /// Returns the areas of greedy trees over some triangles, along the file's axes for `None`.
-    /// `None` if the observer cancels.
-    fn prices(&self, triangles: &[Triangle], tried: &[Option<DQuat>]) -> Option<Vec<f64>> {
-        let prices = parallel::map(tried.to_vec(), |rotation| self.price(triangles, rotation));
-        (!self.observer.cancelled()).then_some(prices)
-    }
-
+    /// Returns the area of a greedy tree over some triangles, along the file's axes for `None`.
     fn price(&self, triangles: &[Triangle], rotation: Option<DQuat>) -> f64 {
         let frame = rotation.and_then(|rotation| self.frame(rotation));
         let boxes = InFrame { triangles, frame: frame.as_ref() }.boxes();

@@ -112,13 +112,7 @@ impl Check for From<'_> {
 search_by_metric!(From<'_>);
 
 impl From<'_> {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let tree = Kept::new(self.tree.clone(), problem);
         let best = Incumbent::begin(tree, problem, run);
         self.config.improved(best, None, metric, problem, seed, run)

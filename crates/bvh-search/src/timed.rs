@@ -37,8 +37,9 @@ pub fn improve(tree: &Bvh, boxes: &[Aabb], time: Duration) -> Result<Outcome, Se
 /// like the recorded `segments`, and the density of these rays as by
 /// [`ray_density`](crate::ray_density).
 ///
-/// The boxes of the tree may lie in a [frame](Bvh::frame). The tree is best for its rays; other rays may take longer than with a tree from [`bake`]. The
-/// layout for the same rays is `WideBvh::for_rays(&tree, &triangles, &density.visits(&tree))`.
+/// The boxes of the tree may lie in a [frame](Bvh::frame). The tree is best for its rays; other rays
+/// may take longer than with a tree from [`bake`]. The layout for the same rays is
+/// `WideBvh::for_rays(&tree, &triangles, &density.visits(&tree))`.
 ///
 /// ```
 /// use bvh_search::prelude::*;

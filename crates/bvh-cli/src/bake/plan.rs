@@ -96,8 +96,8 @@ impl Plan {
         }
     }
 
-    /// Makes the open choices, prints their reasons, and searches until the budget is spent, or the watch's time is over,
-    /// or the user interrupts.
+    /// Makes the open choices, prints their reasons, and searches until the budget is spent, or the
+    /// watch's time is over, or the user interrupts.
     pub fn search<'a>(
         &'a self,
         scene: &'a Scene,

@@ -1,6 +1,6 @@
 //! Inspecting and verifying tree files from the command line and from other languages.
 
-use crate::support::{bvh, facts, number, text};
+use crate::support::{bvh, facts, text};
 use bvh_core::NodeKind;
 use bvh_scenes::{Scene, tree_file};
 use serde_json::{Map, Value};
@@ -116,15 +116,4 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_reject_damage() {
             assert!(!damaged.status.success(), "{} accepted damage", program.display());
         }
     }
-}
-
-#[test]
-fn an_inspection_with_rays_measures_their_expected_tests() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let [searched, greedy] = ["best", "muller_fellner"].map(|method| {
-        bvh(at, &format!("bake escher:500 --budget=2Mwork --out=a.bvh --method={method}"));
-        number(at, "inspect a.bvh escher:500 --rays=default", "tests_per_ray")
-    });
-    assert!(0.0 < searched && searched < greedy, "{searched}");
 }

@@ -146,16 +146,12 @@ mod tests {
     use crate::Scene;
     use bvh_build::{Builder, muller_fellner};
 
-    fn measured(family: Family, query: Query, count: u64, seed: u64) -> (EmpiricalCost, Bvh) {
-        let scene = Scene::load("escher:2000").unwrap();
-        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
-        let rays = RandomRays { family, query, count };
-        (empirical_cost(&rays, &scene.primitives, &tree, seed), tree)
-    }
-
     #[test]
     fn lines_are_tested_against_the_root_and_both_children_of_every_inner_node_they_meet() {
-        let (cost, tree) = measured(Family::Lines, Query::All, 40_000, 1);
+        let scene = Scene::load("escher:2000").unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let rays = RandomRays { family: Family::Lines, query: Query::All, count: 40_000 };
+        let cost = empirical_cost(&rays, &scene.primitives, &tree, 1);
         let expected = 1.0 + bvh_core::cost::goldsmith_salmon(&tree);
         let error = (cost.boxes.mean - expected).abs();
         // An unlucky seed exceeds four standard errors once in 16 000.

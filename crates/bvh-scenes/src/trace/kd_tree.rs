@@ -362,7 +362,7 @@ impl KdTree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_core::{TestCounts, clip_to_box, nearest_hit_of_all};
+    use bvh_core::{clip_to_box, nearest_hit_of_all};
     use glam::Vec3;
     use proptest::prelude::*;
 
@@ -405,21 +405,5 @@ mod tests {
                 prop_assert_eq!(any, expected.is_some(), "{:?}", ray);
             }
         }
-    }
-
-    #[test]
-    fn separate_objects_need_few_tests() {
-        let boxes: Vec<Aabb> = (0..64)
-            .map(|i| Vec3::X * i as f32 * 2.0)
-            .map(|min| Aabb { min, max: min + 1.0 })
-            .collect();
-        let tree = KdTree::build(&boxes).unwrap();
-        assert_eq!(tree.references(), boxes.len());
-        let mut counts = TestCounts::default();
-        let ray = Ray::half_line(Vec3::new(60.5, 0.5, -5.0), Vec3::Z).unwrap();
-        let solid = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], 0.0, t_max);
-        assert_eq!(tree.nearest_hit(&ray, solid, &mut counts).map(|hit| hit.object), Some(30));
-        assert_eq!(counts.objects, 1);
-        assert!(counts.boxes <= 1 + tree.depth() as u64, "{counts:?}");
     }
 }

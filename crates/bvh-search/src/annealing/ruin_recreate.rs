@@ -43,13 +43,7 @@ pub(crate) enum Scale {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let Self { work_per_object } = *self;
         let length =
             work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;

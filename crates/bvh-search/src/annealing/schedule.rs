@@ -18,7 +18,6 @@ use crate::local::incumbent::Incumbent;
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, Working};
 use crate::tuning::{FINAL_PASSES_PART, FINAL_PASSES_WORK, LAST_ROUND, ROUNDS, WORK_PER_ROUND};
-use bvh_config::OutOfRange;
 
 /// The temperatures and the length of one annealing run.
 #[derive(Clone, Copy, Debug)]
@@ -59,10 +58,6 @@ pub(crate) fn anneal_initial<M: Mover>(
         best.offer(tree, run);
     });
     Ok(best.tree)
-}
-
-pub(crate) fn check_fall(hot: f64, cold: f64) -> Result<(), OutOfRange> {
-    if cold > hot { Err(OutOfRange::new("cold", cold, "above 0, not above hot")) } else { Ok(()) }
 }
 
 /// Anneals `tree`, then improves it to a local optimum of reinsertion. Calls `round` after every
@@ -211,6 +206,6 @@ mod tests {
         for by_layout in [false, true] {
             check(|| RuinMover::new(Scale::Saved, 1000.0, by_layout));
         }
-        check(|| single::SingleMover::new(12));
+        check(single::SingleMover::default);
     }
 }

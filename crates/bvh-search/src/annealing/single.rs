@@ -7,51 +7,38 @@
 
 use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
-use super::schedule::{anneal_initial, check_fall};
+use super::schedule::anneal_initial;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
-use bvh_config::above;
 use bvh_core::PackedAabb;
 use rand::RngExt;
 
 bvh_config::config! {
-    /// The move, the temperatures and the amount of work. A move removes a random subtree, more
-    /// often below a large node, and inserts it again at the best other position at most some
-    /// levels above its old one.
+    /// The amount of work. A move removes a random subtree, more often below a large node, and
+    /// inserts it again at the best other position at most some levels above its old one.
     pub struct Config {
-        /// Maximum number of levels up.
-        climb: u32 = 12, in 1..=u32::MAX - 1;
-        /// First temperature, relative to the area saved by the removal.
-        hot: f64 = 0.3, in above(0.0);
-        /// Last temperature, not above `hot`.
-        cold: f64 = 0.003, in above(0.0);
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
     }
-    check |config: &Config| check_fall(config.hot, config.cold);
 }
+
+/// Maximum number of levels up.
+const CLIMB: u32 = 12;
+
+/// First and last temperature, relative to the area saved by the removal.
+const HEAT: [f64; 2] = [0.3, 0.003];
 
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Found {
-        let Self { climb, hot, cold, work_per_object } = *self;
-        let mover = || SingleMover::new(climb);
-        anneal_initial(mover, [hot, cold], work_per_object, metric, problem, seed, run)
+    fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+        anneal_initial(SingleMover::default, HEAT, self.work_per_object, metric, problem, seed, run)
     }
 }
 
 /// Moves one subtree at a time.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct SingleMover {
-    /// Maximum number of levels up.
-    climb: u32,
     sampler: NodeSampler,
     /// Inner nodes whose children remain to be examined, each with the growth of the node and of
     /// all its ancestors up to the top.
@@ -60,10 +47,6 @@ pub(crate) struct SingleMover {
 }
 
 impl SingleMover {
-    pub fn new(climb: u32) -> Self {
-        Self { climb, sampler: NodeSampler::default(), stack: Vec::new(), work: 0 }
-    }
-
     /// Returns the cheapest position for a detached item, next to `top` or below it, but not next
     /// to `sibling`; `None` if none costs less than `limit`. The growth above the top is not
     /// counted.
@@ -135,7 +118,7 @@ impl Mover for SingleMover {
         // decision.
         let (saved, sibling, visits) = tree.detach(node);
         self.work += visits;
-        let levels = rng.random_range(1..=self.climb);
+        let levels = rng.random_range(1..=CLIMB);
         // The sibling has replaced the parent, so the climb starts there.
         let mut top = sibling;
         for _ in 0..levels {

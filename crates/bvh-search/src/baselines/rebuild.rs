@@ -27,31 +27,28 @@ use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
 
 bvh_config::config! {
-    /// The subtrees to rebuild, the construction, and the amount of work.
+    /// The amount of work.
     pub struct Config {
-        /// Maximum number of objects of a rebuilt subtree.
-        objects: u32 = 200, in 3..=1_000_000;
-        /// Maximum number of levels from a node with large children up to the root of the rebuilt subtree, because a
-        /// bad split shows below the split that caused it.
-        climb: u32 = 6, in 0..=1000;
-        /// The probability of taking one of the candidates other than the best.
-        noise: f64 = 0.3, in 0.0..=1.0;
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
     }
 }
 
+/// Maximum number of objects of a rebuilt subtree.
+const OBJECTS: u32 = 200;
+
+/// Maximum number of levels from a node with large children up to the root of the rebuilt subtree,
+/// because a bad split shows below the split that caused it.
+const CLIMB: u32 = 6;
+
+/// The probability of taking one of the candidates other than the best.
+const NOISE: f64 = 0.3;
+
 search_by_metric!(Config);
 
 impl Config {
     /// Rebuilds disjoint subtrees in parallel, each with a separate random stream.
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
         let n = tree.objects() as u64;
         if n < 3 {
@@ -63,7 +60,7 @@ impl Config {
         let mut number = 0;
         let mut work_left = self.work_per_object.saturating_mul(n);
         // A batch does not begin unless the remaining work covers it.
-        let enough = BATCH * WORK_PER_OBJECT * n.min(self.objects.into());
+        let enough = BATCH * WORK_PER_OBJECT * n.min(OBJECTS.into());
         while run.stopped().is_none() && work_left.min(run.left().work) >= enough {
             // Grafts scatter a subtree's nodes; the sort makes neighbours in the tree neighbours in
             // memory again.
@@ -75,7 +72,7 @@ impl Config {
                 if quota.work < enough || quota.moves == 0 {
                     break;
                 }
-                let subtrees = self.select(&tree, &mut rng, quota.moves.min(BATCH), &mut round);
+                let subtrees = select(&tree, &mut rng, quota.moves.min(BATCH), &mut round);
                 // The selection draws from stream 0, so constructions begin with stream 1.
                 let first = number + 1;
                 // One half of the quota for the constructions, one for the reinsertions afterwards.
@@ -83,14 +80,7 @@ impl Config {
                 let share = Quota { work: quota.work / (2 * BATCH), ..Quota::ENDLESS };
                 let construct = |index: usize| {
                     let rng = stream(seed, first + index as u64);
-                    self.construct(
-                        &tree,
-                        problem.measure,
-                        &subtrees[index],
-                        share,
-                        rng,
-                        run.observer(),
-                    )
+                    construct(&tree, problem.measure, &subtrees[index], share, rng, run.observer())
                 };
                 let found = parallel::map((0..subtrees.len()).collect(), construct)
                     .into_iter()
@@ -128,8 +118,8 @@ struct Subtree {
 }
 
 impl Subtree {
-    /// Collects the subtree below `root`; `None` if it has more than `most` leaves.
-    fn below(tree: &Working<impl Metric>, root: u32, most: u32) -> Option<Self> {
+    /// Collects the subtree below `root`; `None` if it has more than [`OBJECTS`] leaves.
+    fn below(tree: &Working<impl Metric>, root: u32) -> Option<Self> {
         let mut subtree = Self::default();
         let mut stack = vec![root];
         while let Some(index) = stack.pop() {
@@ -142,7 +132,7 @@ impl Subtree {
                 stack.extend([node.children[1], node.children[0]]);
             }
             // A subtree has one leaf more than inner nodes.
-            if subtree.inner.len() >= most as usize {
+            if subtree.inner.len() >= OBJECTS as usize {
                 return None;
             }
         }
@@ -156,78 +146,71 @@ impl Subtree {
     }
 }
 
-impl Config {
-    /// Selects `picks` subtrees and returns the disjoint ones of suitable size.
-    fn select(
-        &self,
-        tree: &Working<impl Metric>,
-        rng: &mut Stream,
-        picks: u64,
-        tally: &mut Tally,
-    ) -> Vec<Subtree> {
-        let mut subtrees: Vec<Subtree> = Vec::new();
-        for _ in 0..picks {
-            tally.moves += 1;
-            tally.work += u64::from(TOURNAMENT);
-            let mut root = (-1.0, ANCHOR);
-            for _ in 0..TOURNAMENT {
-                let index = rng.random_range(1..tree.nodes.len() as u32);
-                let contribution = contribution(tree, index);
-                if contribution > root.0 {
-                    root = (contribution, index);
-                }
-            }
-            let mut found = None;
-            let mut index = root.1;
-            for _ in 0..=rng.random_range(0..=self.climb) {
-                let Some(subtree) = Subtree::below(tree, index, self.objects) else { break };
-                tally.work += subtree.inner.len() as u64;
-                found = Some(subtree);
-                index = tree.nodes[index as usize].parent;
-                if index == ANCHOR {
-                    break;
-                }
-            }
-            let Some(subtree) = found.filter(|subtree| subtree.leaves.len() >= 3) else { continue };
-            if !subtrees.iter().any(|other| other.overlaps(&subtree)) {
-                subtrees.push(subtree);
+/// Selects `picks` subtrees and returns the disjoint ones of suitable size.
+fn select(
+    tree: &Working<impl Metric>,
+    rng: &mut Stream,
+    picks: u64,
+    tally: &mut Tally,
+) -> Vec<Subtree> {
+    let mut subtrees: Vec<Subtree> = Vec::new();
+    for _ in 0..picks {
+        tally.moves += 1;
+        tally.work += u64::from(TOURNAMENT);
+        let mut root = (-1.0, ANCHOR);
+        for _ in 0..TOURNAMENT {
+            let index = rng.random_range(1..tree.nodes.len() as u32);
+            let contribution = contribution(tree, index);
+            if contribution > root.0 {
+                root = (contribution, index);
             }
         }
-        subtrees
+        let mut found = None;
+        let mut index = root.1;
+        for _ in 0..=rng.random_range(0..=CLIMB) {
+            let Some(subtree) = Subtree::below(tree, index) else { break };
+            tally.work += subtree.inner.len() as u64;
+            found = Some(subtree);
+            index = tree.nodes[index as usize].parent;
+            if index == ANCHOR {
+                break;
+            }
+        }
+        let Some(subtree) = found.filter(|subtree| subtree.leaves.len() >= 3) else { continue };
+        if !subtrees.iter().any(|other| other.overlaps(&subtree)) {
+            subtrees.push(subtree);
+        }
     }
+    subtrees
+}
 
-    /// Constructs another tree over the leaves of a subtree. Returns it if it is better, and the
-    /// work.
-    fn construct<A: Metric>(
-        &self,
-        tree: &Working<A>,
-        measure: Option<&dyn Measure>,
-        subtree: &Subtree,
-        quota: Quota,
-        rng: Stream,
-        observer: &dyn Observer,
-    ) -> Result<(Option<Working<A>>, Tally), SearchError> {
-        let boxes: Vec<Aabb> = subtree
-            .leaves
-            .iter()
-            .map(|&leaf| Aabb::from(&tree.nodes[leaf as usize].aabb))
-            .collect();
-        let mut rule = Randomised::new(Candidates::AxisBest, Some(self.noise), rng);
-        let mut other = Bvh::default();
-        let scene = Presorted::new(&boxes)?;
-        let workspace = &mut Workspace::default();
-        let constructed = built_unless_cancelled(observer, |watch| {
-            construction().construct(&scene, measure, Some(&mut rule), workspace, &mut other, watch)
-        })?;
-        if constructed.is_none() {
-            return Ok((None, Tally::default()));
-        }
-        let mut other = Working::from_bvh(&other, tree.metric())?;
-        let mut tally = reinsertion::to_local_optimum(&mut other, quota, observer);
-        tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
-        let better = other.area() < subtree.area * (1.0 - TOLERANCE);
-        Ok((better.then_some(other), tally))
+/// Constructs another tree over the leaves of a subtree. Returns it if it is better, and the
+/// work.
+fn construct<A: Metric>(
+    tree: &Working<A>,
+    measure: Option<&dyn Measure>,
+    subtree: &Subtree,
+    quota: Quota,
+    rng: Stream,
+    observer: &dyn Observer,
+) -> Result<(Option<Working<A>>, Tally), SearchError> {
+    let boxes: Vec<Aabb> =
+        subtree.leaves.iter().map(|&leaf| Aabb::from(&tree.nodes[leaf as usize].aabb)).collect();
+    let mut rule = Randomised::new(Candidates::AxisBest, Some(NOISE), rng);
+    let mut other = Bvh::default();
+    let scene = Presorted::new(&boxes)?;
+    let workspace = &mut Workspace::default();
+    let constructed = built_unless_cancelled(observer, |watch| {
+        construction().construct(&scene, measure, Some(&mut rule), workspace, &mut other, watch)
+    })?;
+    if constructed.is_none() {
+        return Ok((None, Tally::default()));
     }
+    let mut other = Working::from_bvh(&other, tree.metric())?;
+    let mut tally = reinsertion::to_local_optimum(&mut other, quota, observer);
+    tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
+    let better = other.area() < subtree.area * (1.0 - TOLERANCE);
+    Ok((better.then_some(other), tally))
 }
 
 /// Returns the total area of a node's children, 0 for a leaf.
@@ -298,21 +281,20 @@ mod tests {
     fn grafting_changes_the_subtree_alone_and_areas_stay_exact() {
         let boxes = scatter(400);
         let mut tree = built(&median_cut::Config::default(), &boxes);
-        let config = Config { objects: 50, ..Config::default() };
         let mut rng = stream(1, 0);
         let mut kept = 0;
         let begin = tree.area();
         for number in 0..300 {
-            let subtrees = config.select(&tree, &mut rng, 4, &mut Tally::default());
+            let subtrees = select(&tree, &mut rng, 4, &mut Tally::default());
             let before = tree.area();
             for subtree in &subtrees {
-                let found = config
-                    .construct(&tree, None, subtree, Quota::ENDLESS, stream(1, number + 1), &())
-                    .unwrap();
+                let found =
+                    construct(&tree, None, subtree, Quota::ENDLESS, stream(1, number + 1), &())
+                        .unwrap();
                 let Some(other) = found.0 else { continue };
                 tree.begin();
                 graft(&mut tree, subtree, &other);
-                let after = Subtree::below(&tree, subtree.inner[0], 50).unwrap();
+                let after = Subtree::below(&tree, subtree.inner[0]).unwrap();
                 assert!((after.area - other.area()).abs() <= 1e-12 * other.area());
                 let leaves: BTreeSet<u32> = after.leaves.into_iter().collect();
                 assert_eq!(leaves, subtree.leaves.iter().copied().collect());
@@ -325,26 +307,5 @@ mod tests {
         let found = tree.to_bvh();
         validate(&found, &boxes).unwrap();
         assert!(found.is_tight(&boxes));
-    }
-
-    #[test]
-    fn subtrees_of_one_batch_have_no_leaf_in_common() {
-        let boxes = scatter(100);
-        let tree = built(&construction(), &boxes);
-        let config = Config { objects: 30, ..Config::default() };
-        let mut rng = stream(1, 0);
-        let mut several = 0;
-        for _ in 0..200 {
-            let subtrees = config.select(&tree, &mut rng, 8, &mut Tally::default());
-            let mut leaves: Vec<u32> =
-                subtrees.iter().flat_map(|subtree| subtree.leaves.iter().copied()).collect();
-            let count = leaves.len();
-            leaves.sort_unstable();
-            leaves.dedup();
-            assert_eq!(leaves.len(), count);
-            assert!(subtrees.iter().all(|subtree| (3..=30).contains(&subtree.leaves.len())));
-            several += usize::from(subtrees.len() > 1);
-        }
-        assert!(several > 100);
     }
 }

@@ -16,28 +16,20 @@ use crate::tree::{Metric, NONE, Subsets, Working, search_by_metric};
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
-    /// The size of treelets, the number of passes, and the initial tree.
+    /// The size of treelets.
     pub struct Config {
         /// Leaves of a treelet. Solving one takes O(3^size) time. The paper uses 7.
         size: u32 = 7, in 3..=12;
-        /// Maximum number of passes over all nodes; the method ends earlier at a local optimum.
-        sweeps: u32 = 1000, in 1..;
     }
 }
 
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        _seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, _: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
         let mut solver = Solver::new(self.size, &tree);
-        best.improve(&mut tree, self.sweeps, run, |tree, quota, observer| {
+        best.improve(&mut tree, run, |tree, quota, observer| {
             pass(tree, &mut solver, quota, observer)
         });
         Ok(best.tree)

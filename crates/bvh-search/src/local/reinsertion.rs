@@ -31,25 +31,16 @@ use crate::tree::{ANCHOR, Metric, PositionSearch, Working, search_by_metric};
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
-    /// The number of passes.
-    pub struct Config {
-        /// Maximum number of passes; the method ends earlier at a local optimum.
-        sweeps: u32 = 1000, in 1..;
-    }
+    /// Without parameters.
+    pub struct Config {}
 }
 
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        _seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, _: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
-        best.improve(&mut tree, self.sweeps, run, pass_by_area);
+        best.improve(&mut tree, run, pass_by_area);
         Ok(best.tree)
     }
 }
@@ -65,7 +56,10 @@ pub(crate) fn pass_by_area(
         return Tally::default();
     }
     let mut order = tree.preorder();
-    sort_by_area(tree, &mut order);
+    // The sort is stable. Areas are never negative, so their inverted bits are in reverse order. A
+    // key is read from memory once and not at every comparison, which in large trees takes most of
+    // the time.
+    order.sort_by_cached_key(|&index| !tree.nodes[index as usize].area.to_bits());
     pass(tree, &order, quota, observer)
 }
 
@@ -76,14 +70,6 @@ pub(crate) fn to_local_optimum(
     observer: &dyn Observer,
 ) -> Tally {
     repeat(quota, observer, |quota| pass_by_area(tree, quota, observer))
-}
-
-/// Sorts nodes by area, the largest first. The sort is stable: nodes of equal area keep their
-/// order.
-pub(crate) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
-    // Areas are never negative, so their inverted bits are in reverse order. A key is read from
-    // memory once and not at every comparison, which in large trees takes most of the time.
-    order.sort_by_cached_key(|&index| !tree.nodes[index as usize].area.to_bits());
 }
 
 /// Repeats a pass until it keeps no move, the quota is used up, or the observer cancels.

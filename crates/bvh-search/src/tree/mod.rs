@@ -192,24 +192,9 @@ impl<M: Metric> Working<M> {
         let sibling = self.nodes[parent as usize].other(node);
         self.write(parent).parent = NONE;
         self.replace_child(above, parent, sibling);
-        let mut saved = area;
-        let mut index = above;
-        let mut visits = 2;
-        while index != ANCHOR {
-            let aabb = self.union_of(self.nodes[index as usize].children);
-            visits += 1;
-            // An unchanged box leaves all boxes above unchanged, too.
-            if aabb == self.nodes[index as usize].aabb {
-                break;
-            }
-            let area = self.metric.of(&aabb);
-            let node = self.write(index);
-            saved += node.area - area;
-            (node.aabb, node.area) = (aabb, area);
-            index = node.parent;
-        }
-        self.added -= saved;
-        (saved, sibling, visits)
+        let shrunk = |tree: &Self, index: u32| tree.union_of(tree.nodes[index as usize].children);
+        let (added, visits) = self.resize_above(above, -area, shrunk);
+        (-added, sibling, visits)
     }
 
     /// Inserts a detached `node` next to `position`, with its parent node above both. Returns the
@@ -224,20 +209,32 @@ impl<M: Metric> Working<M> {
         let area = self.metric.of(&aabb);
         let joint = self.write(parent);
         (joint.children, joint.aabb, joint.area) = ([position, node], aabb, area);
-        let mut added = area;
-        let mut index = above;
+        self.resize_above(above, area, |tree, index| {
+            tree.nodes[index as usize].aabb.union(&added_box)
+        })
+    }
+
+    /// Gives the node `index` and its ancestors new boxes, up to one whose box stays the same, and
+    /// with it all boxes above. Returns the area that the change has `added` before and here, and
+    /// the number of nodes visited.
+    #[inline(always)]
+    fn resize_above(
+        &mut self,
+        mut index: u32,
+        mut added: f64,
+        box_of: impl Fn(&Self, u32) -> PackedAabb,
+    ) -> (f64, u64) {
         let mut visits = 2;
         while index != ANCHOR {
-            let grown = self.nodes[index as usize].aabb.union(&added_box);
+            let aabb = box_of(self, index);
             visits += 1;
-            // An ancestor that already contains the box ends the growth.
-            if grown == self.nodes[index as usize].aabb {
+            if aabb == self.nodes[index as usize].aabb {
                 break;
             }
-            let area = self.metric.of(&grown);
+            let area = self.metric.of(&aabb);
             let node = self.write(index);
             added += area - node.area;
-            (node.aabb, node.area) = (grown, area);
+            (node.aabb, node.area) = (aabb, area);
             index = node.parent;
         }
         self.added += added;

@@ -1,6 +1,7 @@
 //! The everyday calls keep their time limit, use all of it, and end with good trees.
 
 use crate::{scatter, work};
+use bvh_scenes::Scene;
 use bvh_search::bvh_core::Primitives;
 use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::time::Instant;
@@ -45,50 +46,32 @@ fn a_tree_of_many_references_per_object_is_loaded_and_improved() {
     let bytes = bake.write(&tree, 0, |sections| sections.concat()).unwrap();
     let mut owned = OwnedTree::load(Objects::Shapes(shapes), &bytes).unwrap();
     let before = owned.cost(Objective::InternalArea);
-    improve_owned(&mut owned, Duration::from_millis(20));
+    owned.apply(owned.improvement(work(100_000), &()).unwrap());
     assert!(owned.cost(Objective::InternalArea) <= before);
-}
-
-fn improve_owned(owned: &mut OwnedTree, time: Duration) {
-    let improvement = owned.improvement(Budget::UNLIMITED, &Deadline::after(time)).unwrap();
-    owned.apply(improvement);
 }
 
 #[test]
 fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
-    // Long and thin, so that dividing them pays.
-    let shifted = |corner: Vec3, by: f32| (corner + Vec3::splat(by)).to_array();
-    let thin = scatter(300, 1).into_iter().map(|aabb| {
-        Triangle::from([aabb.min.to_array(), shifted(aabb.min, 0.3), shifted(aabb.max, 0.3)])
-    });
-    let triangles: Vec<Triangle> = thin.collect();
-    let boxes = boxes(&triangles);
-    let shapes = || Objects::Shapes(Primitives::Triangles(triangles.clone()));
+    // Dividing these pays.
+    let Scene { primitives, boxes, .. } = Scene::load("escher:300").unwrap();
+    let shapes = || Objects::Shapes(primitives.clone());
     for (objects, references) in
         [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)]
     {
-        let deadline = || Deadline::after(Duration::from_millis(50));
-        let options = Options { references: Some(references), seed: 7, ..Options::default() };
-        let mut owned = OwnedTree::find(objects.clone(), &options, &deadline()).unwrap();
+        let budget = work(30_000);
+        let options =
+            Options { references: Some(references), seed: 7, budget, ..Options::default() };
+        let mut owned = OwnedTree::find(objects.clone(), &options, &()).unwrap();
         let first = cost::total_area(owned.tree());
+        owned.apply(owned.improvement(work(3_000_000), &()).unwrap());
+        assert!(cost::total_area(owned.tree()) <= first * (1.0 + 1e-12));
         let may_divide = references > 1.0 && owned.triangles().is_some();
-        let mut time = Duration::from_millis(50);
-        let divides = loop {
-            improve_owned(&mut owned, time);
-            assert!(cost::total_area(owned.tree()) <= first * (1.0 + 1e-12));
-            let divides = owned.tree().prim_ids.len() > boxes.len();
-            // A busy or an emulated processor may need more than a moment before it divides any.
-            if divides == may_divide || time > Duration::from_secs(30) {
-                break divides;
-            }
-            time *= 2;
-        };
-        assert_eq!(divides, may_divide);
+        assert_eq!(owned.tree().prim_ids.len() > boxes.len(), may_divide);
         let saved = owned.save().unwrap();
         let mut loaded = OwnedTree::load(objects, &saved).unwrap();
         assert!(loaded.save().unwrap() == saved, "another seed or work");
         assert_eq!((loaded.tree(), loaded.objects()), (owned.tree(), boxes.len()));
-        improve_owned(&mut loaded, Duration::from_millis(50));
+        loaded.apply(loaded.improvement(work(100_000), &()).unwrap());
         assert!(cost::total_area(loaded.tree()) <= first * (1.0 + 1e-12));
     }
 }
@@ -132,7 +115,7 @@ fn a_tree_with_its_objects_follows_a_seed_a_budget_recorded_rays_and_moved_objec
 #[test]
 fn no_bake_of_work_is_behind_reinsertion_within_the_same_work() {
     for (name, objects) in [("escher", 60), ("bijou", 500), ("konistil", 300), ("S04", 200)] {
-        let scene = bvh_scenes::Scene::load(&format!("{name}:{objects}")).unwrap();
+        let scene = Scene::load(&format!("{name}:{objects}")).unwrap();
         let boxes = &scene.boxes;
         for per_object in [1, 5, 20, 30, 50, 100, 200, 400, 1000, 3000, 20_000, 60_000] {
             let budget = work(per_object * objects);

@@ -4,8 +4,8 @@ use crate::{scatter, work};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, Node, cost, validate};
 use bvh_search::{
-    Budget, Event, Method, Observer, Outcome, Problem, Search, SearchError, StopReason, annealing,
-    best, genetic, optimize, rebuild, solve,
+    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, best, genetic,
+    optimize, solve,
 };
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
@@ -19,7 +19,7 @@ fn methods() -> impl Iterator<Item = Method> {
 }
 
 /// The builder of the tree that local searches begin with.
-pub(crate) fn construction() -> muller_fellner::Config {
+fn construction() -> muller_fellner::Config {
     let heuristic = muller_fellner::Heuristic::AreaTimesPower(0.9);
     muller_fellner::Config { heuristic, ..Default::default() }
 }
@@ -213,17 +213,11 @@ fn leaves_of_several_objects_are_kept_and_other_trees_are_rejected_by_name() {
 }
 
 #[test]
-fn parameters_that_contradict_others_or_that_no_poll_could_interrupt_are_named() {
-    fn error(method: &dyn Search, objects: u32) -> String {
-        let boxes = scatter(objects, 1);
-        solve(method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
-    }
-    let cold = annealing::Config { cold: 1.0, ..Default::default() };
-    assert_eq!(error(&cold, 0), "cold is 1; accepted: above 0, not above hot");
-    let climb = rebuild::Config { climb: 1 << 31, ..Default::default() };
-    assert_eq!(error(&climb, 0), "climb is 2147483648; accepted: 0 to 1000");
-    let population = genetic::Config { population: 1_000_000, ..Default::default() };
-    assert_eq!(error(&population, 1024), "population is 1000000; accepted: at most 262144");
+fn a_population_that_no_memory_holds_is_named() {
+    let boxes = scatter(1024, 1);
+    let config = genetic::Config { population: 1_000_000, ..Default::default() };
+    let error = solve(&config, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap_err();
+    assert_eq!(error.to_string(), "population is 1000000; accepted: at most 262144");
 }
 
 proptest! {

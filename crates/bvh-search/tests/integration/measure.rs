@@ -1,9 +1,7 @@
 //! Measures of boxes instead of the area: every builder and search uses them, and the area as a
 //! measure equals the area.
 
-use crate::local_search::construction;
 use crate::{scatter, work};
-use bvh_build::{Builder, Watch};
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, Bvh, PackedAabb, RayDensity, Segment, validate};
 use bvh_search::{
@@ -87,21 +85,6 @@ fn builders_and_searches_use_the_measure_and_report_every_objective_by_it() {
             assert!(name == "median_cut" || area.tree != found.tree, "{name} {objective:?}");
         }
     }
-}
-
-#[test]
-fn a_local_search_begins_with_a_tree_by_the_measure() {
-    let boxes = scatter(700, 1);
-    let begun = construction().build_watched(&boxes, Some(&AlongX), &Watch::default()).unwrap();
-    let start = |measure| {
-        let problem = Problem { measure, ..Problem::new(&boxes) };
-        let budget = Budget { max_evaluations: Some(1), ..Budget::UNLIMITED };
-        let outcome = solve(&reinsertion::Config::default(), &problem, 1, budget, &()).unwrap();
-        cost::internal_measure(&outcome.tree, &AlongX)
-    };
-    let cost = start(Some(&AlongX as &dyn Measure));
-    assert_eq!(cost, cost::internal_measure(&begun, &AlongX));
-    assert!(cost < 0.99 * start(None));
 }
 
 /// Judges a tree by a small fraction of its area.

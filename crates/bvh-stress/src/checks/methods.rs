@@ -144,7 +144,7 @@ pub fn a_million_moves(_: &Method) -> Verdict {
     const MOVES: u64 = 1_000_000;
     let boxes = boxes(60);
     // Without another end.
-    let config = annealing::Config { work_per_object: MOVES, ..Default::default() };
+    let config = annealing::Config { work_per_object: MOVES };
     let budget = Budget { max_evaluations: Some(MOVES), max_work: None };
     let outcome = solved(&config, &boxes, 42, budget)?;
     let error = check_outcome(&boxes, &outcome)?;
