@@ -17,18 +17,19 @@ use std::path::PathBuf;
 /// Turn each mesh of a file so that the boxes of any tracer are small, and its nodes back. The world
 /// stays the same but for rounding turned vertices once, by up to half a unit in the last place.
 ///
-/// A glTF file becomes a GLB file, whose nodes have the inverse rotations. A mesh with a skin, with
-/// quantised vertices or with an extension that may depend on them is left as it is, with a remark.
+/// A glTF file becomes a GLB file, whose nodes have the inverse rotations. An OBJ file has the
+/// inverse matrix in a comment in its first line. A mesh with a skin, with quantised vertices or with
+/// an extension that may depend on them is left as it is, with a remark.
 ///
 /// Example: bvh orient house.gltf --out house.glb --report
 #[derive(Args, Clone, Debug)]
 pub struct OrientArgs {
-    /// The path of a glTF or GLB file.
+    /// The path of an OBJ, glTF or GLB file.
     #[arg(value_name = "FILE")]
     pub scene: PathBuf,
     /// The file to write, replaced when it is complete. If the scene names other files, in the same
     /// folder.
-    #[arg(long, value_name = "FILE.glb")]
+    #[arg(long, value_name = "FILE.glb|.obj")]
     pub out: PathBuf,
     /// Print for every turned mesh the number of triangles, and the area that a tree saves, by short
     /// searches over a sample of large meshes.
@@ -40,9 +41,11 @@ pub struct OrientArgs {
 pub fn orient(args: &OrientArgs, answer: &mut Answer) -> Result<(), Error> {
     let OrientArgs { scene: path, out, report } = args;
     let bytes = files::read(path)?;
-    // Of another kind no name would be right, and the writer names the kind.
-    if Format::of(&bytes, path) == Format::Gltf {
-        output_file("--out", out, "glb")?;
+    match Format::of(&bytes, path) {
+        Format::Gltf => output_file("--out", out, "glb")?,
+        Format::Obj => output_file("--out", out, "obj")?,
+        // No name of a new file would be right, and the writer names the kind.
+        _ => {}
     }
     if fs::canonicalize(out).is_ok_and(|out| fs::canonicalize(path).is_ok_and(|path| path == out)) {
         let message = format!("--out: {} is the scene; accepted: another name", out.display());

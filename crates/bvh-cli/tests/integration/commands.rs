@@ -6,7 +6,7 @@
 use crate::support::{bvh, facts, names, program, said, unsaid, words, wrong, wrong_flags};
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 #[test]
 fn scenes_are_listed_with_their_sizes() {
@@ -46,7 +46,7 @@ fn folder() -> tempfile::TempDir {
     write("flipped.bvh", &flipped);
     write("file", b"");
     write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    write("mesh.glb", b"{}");
+    write("mesh.ply", b"ply\n");
     write("wrong.toml", b"count = 9\nbouncy = 1\ncameras = []\n");
     write("blind.toml", b"cameras = [{ eye = [1.0, 2.0, 3.0] }]\n");
     write("none.toml", b"bounces = 1");
@@ -81,10 +81,11 @@ report good.bvh spheres7500 --out=no/x.html ! no is no folder
 report good.bvh spheres75 --out=good.bvh ! --out: good.bvh | .html
 report good.bvh escher --out=x.html ! good.bvh | scene
 export good.bvh spheres75 --for=obvhs --out=x.bvh ! --out | .bin
-orient mesh.glb --out=mesh.glb ! --out: mesh.glb is the scene | another name
-orient mesh.glb --out=x.obj ! --out | .glb
+orient mesh.obj --out=mesh.obj ! --out: mesh.obj is the scene | another name
+orient mesh.obj --out=x.glb ! --out | .obj
 orient no.glb --out=x.glb ! no.glb: no such file
-orient mesh.obj --out=x.glb ! mesh.obj: a file of the kind Obj | glTF or GLB
+orient mesh.ply --out=x.ply ! mesh.ply: a file of the kind Ply | OBJ, glTF or GLB
+orient good.bvh --out=x.obj ! good.bvh
 
 bake sofa LONG ! scene sofa: no such scene; accepted: bijou
 bake esher LONG ! no such scene; did you mean escher?
@@ -149,6 +150,17 @@ fn what_is_wrong_is_named_before_the_work_and_changes_no_file() {
     assert!(contents(at) == before, "a file was changed or left behind");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_rejected_as_an_input_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = Command::new("mkfifo").arg("p.bvh").current_dir(at).status();
+    assert!(made.unwrap().success());
+    wrong(at, "inspect p.bvh", &["p.bvh", "not a regular file"]);
+    wrong(at, "bake spheres75 --budget=0s --from=p.bvh --out=x.bvh", &["--from: p.bvh"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
@@ -174,7 +186,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     bvh(at, "bake spheres75 --budget=0s --out=good.bvh");
-    fs::write(at.join("mesh.glb"), "{}").unwrap();
+    fs::write(at.join("mesh.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     // Every command needs its required arguments before a flag can be wrong.
     let flags = wrong_flags(
         at,
@@ -184,7 +196,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
             ("inspect", &["good.bvh", "spheres75"]),
             ("verify", &["good.bvh", "spheres75"]),
             ("export", &["good.bvh", "spheres75", "--for=obvhs", "--out=x.bin"]),
-            ("orient", &["mesh.glb", "--out=x.glb"]),
+            ("orient", &["mesh.obj", "--out=x.obj"]),
             ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
             ("report", &["good.bvh", "spheres75"]),
             ("scenes", &[]),

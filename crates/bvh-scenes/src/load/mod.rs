@@ -4,14 +4,15 @@ mod ears;
 mod gltf;
 pub mod mesh;
 mod obj;
+mod orient;
 mod ply;
 mod polygon;
 mod stl;
 mod text;
 
 use crate::files::{ReadError, read};
-pub use gltf::{Find, Oriented, orient};
 use mesh::{Fault, Mesh};
+pub use orient::{Find, Oriented, orient};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 

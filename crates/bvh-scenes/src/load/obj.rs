@@ -14,6 +14,7 @@
 use super::mesh::{Fault, Mesh, Rounding, counted};
 use super::polygon::{MOST_CORNERS, Polygons};
 use super::text::{self, number, shown};
+use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -50,6 +51,37 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     remarks.extend(geometry.unknown);
     remarks.extend(geometry.rounding.remark(&polygons.triangles));
     Ok(Mesh::new(polygons.triangles, remarks))
+}
+
+/// Turns the vertices and the normals of a file that [`parse`] accepts, in double precision, which
+/// other programs may read. The first line becomes a comment with the inverse.
+pub fn turned(bytes: &[u8], rotation: &DMat3) -> Result<Vec<u8>, Fault> {
+    let rows = rotation.to_cols_array().map(|number| number.to_string()).join(" ");
+    let mut turned = format!("# scene = matrix * vertex, matrix by rows: {rows}\n").into_bytes();
+    let mut statements = Statements::new(bytes);
+    loop {
+        let start = statements.rest;
+        let Some((code, is_continued)) = statements.line() else { return Ok(turned) };
+        let line = &start[..start.len() - statements.rest.len()];
+        let mut words = text::words(code);
+        let keyword = words.next().unwrap_or_default();
+        let is_vector = matches!(keyword, b"v" | b"V" | b"vn" | b"VN");
+        let words: Vec<&[u8]> = words.take(if is_vector { 3 } else { 0 }).collect();
+        let numbers = words.iter().map_while(|word| str::from_utf8(word).ok()?.parse().ok());
+        match numbers.filter(|x: &f64| x.is_finite()).collect::<Vec<f64>>()[..] {
+            [x, y, z] => {
+                let [x, y, z] = (*rotation * DVec3::new(x, y, z)).to_array();
+                let end = words[2].as_ptr_range().end.addr() - line.as_ptr().addr();
+                turned.extend([keyword, format!(" {x} {y} {z}").as_bytes(), &line[end..]].concat());
+            }
+            _ if is_vector && is_continued => {
+                let message = "a vertex on two lines; expected it on one, to be turned";
+                return Err(Fault::in_line(statements.lines, message));
+            }
+            // A vertex that is no number is used by no face.
+            _ => turned.extend(line),
+        }
+    }
 }
 
 /// The checked statements of a file.

@@ -15,15 +15,17 @@ fn corners(bytes: &[u8], name: &str) -> Vec<Vec3> {
     read(bytes, name).unwrap().triangles.iter().flat_map(|triangle| triangle.0).collect()
 }
 
-/// Turns a file, and asserts that corners differ by rounding at most.
-fn turned(bytes: &[u8], name: &str) -> Oriented {
+/// Turns a file, and asserts that corners, which `back` brings back from the new file, differ by
+/// rounding at most.
+fn turned(bytes: &[u8], name: &str, back: DMat3) -> Oriented {
     let find = &mut |_: usize, _: &[_]| Some(rotation());
     let new = orient(bytes, Path::new(name), Path::new("new"), find).unwrap();
     let [old, world] = [bytes, &new.bytes].map(|bytes| corners(bytes, name));
     let size = old.iter().fold(0.0, |size: f32, corner| size.max(corner.abs().max_element()));
     assert_eq!(old.len(), world.len(), "{name}");
     for (old, new) in old.into_iter().zip(world) {
-        assert!((new - old).abs().max_element() <= f32::EPSILON * size, "{name}: {old} {new}");
+        let off = (back * new.as_dvec3()).as_vec3() - old;
+        assert!(off.abs().max_element() <= f32::EPSILON * size, "{name}: {old} {new}");
     }
     new
 }
@@ -38,14 +40,14 @@ fn split(glb: &[u8]) -> (Value, &[u8]) {
 #[test]
 fn a_mesh_in_any_form_is_turned_or_left_with_a_reason() {
     for case in cases().into_iter().filter(|case| case["fault"].is_null()) {
-        let new = turned(&file(&case), "a.glb");
+        let new = turned(&file(&case), "a.glb", DMat3::IDENTITY);
         let is_left =
             case["accessor"]["componentType"] != 5126 || case["node"].get("skin").is_some();
         assert_eq!(new.turned.is_empty(), is_left, "{case}");
         let is_named = new.remarks.iter().any(|remark| remark.contains("left as it is: "));
         assert_eq!(is_named, is_left, "{:?}", new.remarks);
     }
-    let new = turned(&gltf(), "data.gltf");
+    let new = turned(&gltf(), "data.gltf", DMat3::IDENTITY);
     assert!(split(&new.bytes).0["buffers"][0].get("uri").is_none());
     let images = with(&gltf(), "{\"asset\"", r#"{"images": [{"uri": "i.png"}], "asset""#);
     let folder = tempfile::tempdir().unwrap();
@@ -85,7 +87,7 @@ fn rich(from: &str, to: &str) -> Vec<u8> {
 #[test]
 fn vectors_turn_and_everything_else_stays() {
     let bytes = rich("", "");
-    let new = turned(&bytes, "rich.glb");
+    let new = turned(&bytes, "rich.glb", DMat3::IDENTITY);
     assert_eq!((&new.turned[..], &new.remarks[..]), (&[0][..], &[][..]));
     let [(mut old, before), (json, after)] = [&bytes, &new.bytes].map(|bytes| split(bytes));
     let numbers = |bytes: &[u8]| -> Vec<f32> {
@@ -123,7 +125,7 @@ fn vectors_turn_and_everything_else_stays() {
     old["buffers"][0]["byteLength"] = json!(after.len());
     assert_eq!(json, old);
     // Without an animation, a node of its own is turned itself.
-    let still = turned(&rich("animations", "notes"), "still.glb");
+    let still = turned(&rich("animations", "notes"), "still.glb", DMat3::IDENTITY);
     let nodes = split(&still.bytes).0["nodes"].clone();
     assert_eq!((nodes.as_array().unwrap().len(), &nodes[0]["mesh"]), (5, &json!(0)));
 }
@@ -146,7 +148,7 @@ fn a_mesh_that_would_lose_something_is_left_as_it_is() {
         ("0 0 0 1 0 0\"", "0 0 0 3e38 3e38 3e38\"", "accessors[2] would not contain finite"),
     ] {
         let bytes = rich(from, to);
-        let new = turned(&bytes, "a.glb");
+        let new = turned(&bytes, "a.glb", DMat3::IDENTITY);
         assert!(new.bytes == bytes && new.turned.is_empty(), "{reason}");
         assert!(new.remarks.iter().any(|remark| remark.contains(reason)), "{:?}", new.remarks);
     }
@@ -154,7 +156,25 @@ fn a_mesh_that_would_lose_something_is_left_as_it_is() {
     let mut shared: Value = serde_json::from_str(RICH).unwrap();
     shared["meshes"] = vec![json!({"primitives": [{"attributes": {"POSITION": 0}}]}); 99].into();
     shared["nodes"] = (1..100).map(|mesh| json!({ "mesh": mesh })).collect();
-    let new = turned(&file(&shared), "shared.glb");
+    let new = turned(&file(&shared), "shared.glb", DMat3::IDENTITY);
     assert!((10..50).contains(&new.turned.len()) && new.bytes.len() < 30_000, "{:?}", new.turned);
     assert!(new.remarks[0].contains("those of many meshes"), "{:?}", new.remarks);
+}
+
+#[test]
+fn an_obj_file_keeps_every_other_byte_and_has_its_matrix_in_a_comment() {
+    let text =
+        "\u{feff}# a\r\nv 1 2 -3 0.5 0.25 1 # b\r\nvn 0 0 1\n V 4 5e0 6#c\rv 7 8 9 2\rf 1 2 3";
+    let new = turned(text.as_bytes(), "a.obj", rotation().transpose());
+    let new = String::from_utf8(new.bytes).unwrap();
+    let (comment, rest) = new.split_once('\n').unwrap();
+    let rows = rotation().to_cols_array().map(|number| number.to_string()).join(" ");
+    assert!(comment.starts_with('#') && comment.ends_with(&rows), "{comment}");
+    for part in ["# a\r\nv ", " 0.5 0.25 1 # b\r\nvn ", " 2\rf 1 2 3"] {
+        assert!(rest.contains(part), "{part}: {rest}");
+    }
+    let continued = text.replace("5e0 6", "5e0\\\n6");
+    let find = &mut |_: usize, _: &[_]| Some(rotation());
+    let fault = orient(continued.as_bytes(), Path::new("a.obj"), Path::new("b"), find).unwrap_err();
+    assert!(fault.to_string().starts_with("a.obj:4: a vertex on two lines"), "{fault}");
 }

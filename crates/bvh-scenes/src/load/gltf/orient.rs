@@ -8,8 +8,7 @@ use super::buffers::Buffers;
 use super::document::{Document, document, is_covered, text};
 use super::{Fault, get, read};
 use crate::files::folder_of;
-use crate::load::{Format, MeshError};
-use bvh_core::Triangle;
+use crate::load::{Find, Oriented};
 use glam::{DMat3, DQuat, DVec3};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -23,40 +22,8 @@ const OWN: [&str; 7] = ["extras", "mesh", "name", "rotation", "scale", "translat
 /// The number of meshes that may on average use the same vertices.
 const MOST_USES: usize = 4;
 
-/// Returns the rotation by which to turn the mesh with this number and these triangles, if any.
-pub type Find<'a> = &'a mut dyn FnMut(usize, &[Triangle]) -> Option<DMat3>;
-
-/// A glTF file with turned meshes.
-#[derive(Clone, Debug, Default)]
-pub struct Oriented {
-    /// The new file: GLB.
-    pub bytes: Vec<u8>,
-    /// The turned meshes by their numbers in the file.
-    pub turned: Vec<usize>,
-    /// What the user should know, one clause each, such as why a mesh was left as it is.
-    pub remarks: Vec<String>,
-}
-
-/// Turns the meshes of a glTF or GLB file by the rotations that `find` returns, and gives the
-/// inverse to their nodes. The triangles, their order, their places but for rounding the turned
-/// vertices once, and everything else stay. A mesh that would lose something is left as it is.
-///
-/// `path` and `out` are the paths of the file and of the new one. Takes O(bytes) time and memory
-/// besides `find`.
-///
-/// # Errors
-///
-/// The faults of [`parse`](crate::load::parse); another format; a folder of `out` in which the files
-/// that the file names are not; 4 GB of GLB.
-pub fn orient(bytes: &[u8], path: &Path, out: &Path, find: Find) -> Result<Oriented, MeshError> {
-    let oriented = match Format::of(bytes, path) {
-        Format::Gltf => turned(bytes, path, out, find),
-        other => Err(Fault::of_file(format!("a file of the kind {other:?}; expected glTF or GLB"))),
-    };
-    oriented.map_err(MeshError::of(path))
-}
-
-fn turned(bytes: &[u8], path: &Path, out: &Path, find: Find) -> Result<Oriented, Fault> {
+/// Does for a glTF or GLB file what [`orient`](crate::load::orient) does.
+pub fn orient(bytes: &[u8], path: &Path, out: &Path, find: Find) -> Result<Oriented, Fault> {
     let (document, chunk) = document(bytes)?;
     let (text, _, further) = text(bytes)?;
     let meshes = read(&document, chunk, path)?.meshes;
