@@ -4,13 +4,13 @@
 use crate::Error;
 use crate::answer::{Answer, frame_facts, saved};
 use crate::arguments::{load_scene, output_file};
+use crate::output::write_table;
 use crate::rays::Rays;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::Header;
 use bvh_core::{Bvh, NodeKind};
-use bvh_scenes::files::{self, WriteError};
-use bvh_scenes::tree_file;
+use bvh_scenes::{files, tree_file};
 use clap::Args;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -87,20 +87,15 @@ fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
     for (index, node) in tree.nodes.iter().enumerate() {
         parents[node.children()].fill(Some(index));
     }
-    let failed = |error: csv::Error| WriteError::of(path, "write the table")(error.into());
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
-    writer.write_record(columns.split(',')).map_err(failed)?;
-    for (index, (node, parent)) in tree.nodes.iter().zip(parents).enumerate() {
+    let rows = tree.nodes.iter().zip(parents).enumerate().map(|(index, (node, parent))| {
         let (kind, first, count) = match node.kind() {
             NodeKind::Inner { first, count } => ("inner", first, count),
             NodeKind::Leaf { first, count } => ("leaf", first, count),
         };
-        let [min, max] = [node.aabb.min, node.aabb.max].map(|corner| corner.to_array());
-        writer.serialize((index, parent, kind, first, count, min, max)).map_err(failed)?;
-    }
-    let table = writer.into_inner().map_err(|error| failed(error.into_error().into()))?;
-    Ok(files::write(path, &table)?)
+        (index, parent, kind, first, count, node.aabb.min.to_array(), node.aabb.max.to_array())
+    });
+    let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
+    write_table(path, columns, rows)
 }
 
 fn describe(header: &Header, answer: &mut Answer) {

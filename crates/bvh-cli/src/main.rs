@@ -9,6 +9,7 @@ mod export;
 mod inspect;
 mod interrupt;
 mod memory;
+mod npy;
 mod orient;
 mod output;
 mod rays;

@@ -1,7 +1,11 @@
-//! Writes to the terminal, and the contents of pictures.
+//! Writes to the terminal, and the contents of files: tables and pictures.
 
+use crate::Error;
+use bvh_scenes::files::{self, WriteError};
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -56,6 +60,22 @@ pub fn answered(answer: &clap::Error) -> ExitCode {
     }
     print_bytes(text.as_bytes());
     succeeded()
+}
+
+/// Writes rows as CSV to a file.
+pub fn write_table<R: Serialize>(
+    path: &Path,
+    columns: &str,
+    rows: impl Iterator<Item = R>,
+) -> Result<(), Error> {
+    let failed = |error: csv::Error| WriteError::of(path, "write the table")(error.into());
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(columns.split(',')).map_err(failed)?;
+    for row in rows {
+        writer.serialize(row).map_err(failed)?;
+    }
+    let table = writer.into_inner().map_err(|error| failed(error.into_error().into()))?;
+    Ok(files::write(path, &table)?)
 }
 
 /// Encodes pixels, row by row from the top, as a PNG file with the highest compression.

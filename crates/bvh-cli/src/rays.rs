@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::arguments::input_file;
 use crate::interrupt::is_interrupted;
+use crate::npy::read_npy;
 use bvh_config::fault;
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, DensityError, Ray, RayDensity, Segment, Slabs};
@@ -36,11 +37,13 @@ impl Rays {
         let invalid = |message: String| Error::Usage(format!("{named}: {message}"));
         match extension {
             Some("toml") => fault::parse(&read_text(path)?).map(Self::Rendered).map_err(invalid),
-            Some(format @ ("csv" | "bin")) => {
+            Some(format @ ("csv" | "npy" | "bin")) => {
                 let segments = recorded(format, &read(path)?).map_err(invalid)?;
                 Ok(Self::Recorded(named.to_owned(), segments))
             }
-            _ => Err(invalid("--rays accepts files that end with .toml, .csv or .bin".into())),
+            _ => {
+                Err(invalid("--rays accepts files that end with .toml, .csv, .npy or .bin".into()))
+            }
         }
     }
 
@@ -106,12 +109,13 @@ impl Rays {
     }
 }
 
-/// Reads segments, in the scene's coordinates, from a file in the format `csv`; in any other format
-/// the file is little-endian `f32`. Messages count lines from 1, as editors do, and
+/// Reads segments, in the scene's coordinates, from a file in the format `csv` or `npy`; in any
+/// other format the file is little-endian `f32`. Messages count lines from 1, as editors do, and
 /// segments from 0, as arrays do.
 fn recorded(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
     let numbers = match format {
         "csv" => read_csv(bytes)?,
+        "npy" => read_npy(bytes)?,
         _ => read_floats(bytes)?,
     };
     let (segments, rest) = numbers.as_chunks::<6>();

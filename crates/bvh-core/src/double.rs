@@ -318,7 +318,7 @@ impl NearestHit {
 
     /// Returns the hit, whose distance is known.
     pub(crate) fn hit(&self) -> Option<DHit> {
-        (self.object != u32::MAX).then_some(DHit { t: self.low, object: self.object })
+        (self.object != u32::MAX).then_some(DHit { t: self.low + 0.0, object: self.object })
     }
 }
 

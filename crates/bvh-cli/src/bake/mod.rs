@@ -47,9 +47,9 @@ pub struct BakeArgs {
     pub seed: u64,
     /// Minimise the cost of rays instead of area: `default` for rays that need no camera, a TOML
     /// file that describes the rays of a renderer, or a file of recorded segments: six numbers
-    /// each, from the origin to the hit, as lines of CSV, or as little-endian `f32`, which numpy
-    /// writes by `tofile`.
-    #[arg(long, value_name = "default|FILE.toml|.csv|.bin")]
+    /// each, from the origin to the hit, as lines of CSV, as an array of numpy, (n, 6) or (n, 2, 3),
+    /// or as little-endian `f32`.
+    #[arg(long, value_name = "default|FILE.toml|.csv|.npy|.bin")]
     pub rays: Option<String>,
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
     /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the

@@ -118,7 +118,7 @@ bake spheres75 LONG --rays=blind.toml ! blind.toml | line 1 | target
 bake spheres75 LONG --rays=none.toml ! none.toml | cameras is empty | eye
 bake spheres75 LONG --rays=gone.toml ! --rays | gone.toml | no such file
 bake escher LONG --rays=away.csv ! away.csv: none of the 9 segments meets the box of scene escher
-bake spheres75 LONG --rays=mesh.obj ! mesh.obj: --rays accepts | .csv or .bin
+bake spheres75 LONG --rays=mesh.obj ! mesh.obj: --rays accepts | .npy or .bin
 bake escher VAST --parts=4 --part=0123 ! --part 0123 | no such part | --list
 bake escher VAST --parts=4 --rays=default ! --parts | --rays | cannot be used with
 bake spheres75 VAST --parts=76 ! --parts 76 | accepted: 2 to the number of objects, 75

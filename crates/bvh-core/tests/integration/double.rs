@@ -305,6 +305,20 @@ fn every_kernel_finds_all_hits_closest_points_and_insides_as_all_triangles_toget
 }
 
 #[test]
+fn no_distance_is_minus_zero() {
+    let triangles = [DTriangle::from([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]])];
+    let ray = DRay::half_line([0.1, 0.1, 0.0], [0.0, 0.0, -1.0]).unwrap();
+    let frame = DWideBvh::centred(&triangles);
+    let tree = chain(&DWideBvh::boxes(&triangles, &frame));
+    let layout = DWideBvh::new(&Bvh { frame: Some(frame), ..tree }, &triangles).unwrap();
+    for kernel in Kernel::ALL {
+        let Some(layout) = layout.clone().with_kernel(kernel) else { continue };
+        let hit = layout.nearest_hit(&ray, Select::default()).unwrap();
+        assert_eq!(hit.t.to_bits(), 0.0f64.to_bits(), "{kernel:?}");
+    }
+}
+
+#[test]
 fn numbers_beyond_the_exact_range_are_rejected() {
     let up = DVec3::Z;
     let tiny = DRay::half_line([1.0, 1e-50, -5e-324], [1e-60, 0.0, 1.0]);

@@ -1,0 +1,89 @@
+//! Recorded rays as an array that `numpy.save` wrote.
+
+/// Returns the numbers of an array of shape (n, 6) or (n, 2, 3), `float32` or `float64`. Doubles are
+/// rounded. The format is described in `numpy.lib.format`.
+///
+/// # Errors
+///
+/// Returns a message for bytes that are no such array, or less or more of it than its shape says.
+pub fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
+    let (header, data) = split(bytes).ok_or("the file is not an array of numpy")?;
+    let rejected = |accepted: &str| Err(format!("the array is {header}; accepted: {accepted}"));
+    let size = match header.split_once("'descr':'<f") {
+        Some((_, kind)) if kind.starts_with("4'") => size_of::<f32>(),
+        Some((_, kind)) if kind.starts_with("8'") => size_of::<f64>(),
+        _ => return rejected("float32 or float64"),
+    };
+    let segments = match shape(&header).as_deref() {
+        Some(&[segments, 6] | &[segments, 2, 3]) if header.contains("'fortran_order':False") => {
+            segments
+        }
+        _ => return rejected("(n, 6) or (n, 2, 3) in row order"),
+    };
+    // A copy that was cut off would otherwise train the tree for a part of its rays.
+    if segments.checked_mul(6 * size) != Some(data.len()) {
+        return Err(format!("the array is {header} and has {} bytes of data", data.len()));
+    }
+    Ok(match size {
+        4 => data.as_chunks().0.iter().map(|&single| f32::from_le_bytes(single)).collect(),
+        _ => data.as_chunks().0.iter().map(|&double| f64::from_le_bytes(double) as f32).collect(),
+    })
+}
+
+/// Splits an array into its header, without spaces, and its data.
+fn split(bytes: &[u8]) -> Option<(String, &[u8])> {
+    let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+    let (&[major, _minor], rest) = rest.split_first_chunk()?;
+    // The length of the header has two bytes in version 1, and four in later ones.
+    let (length, rest) = if major == 1 {
+        let (&length, rest) = rest.split_first_chunk()?;
+        (usize::from(u16::from_le_bytes(length)), rest)
+    } else {
+        let (&length, rest) = rest.split_first_chunk()?;
+        (u32::from_le_bytes(length) as usize, rest)
+    };
+    let (header, data) = rest.split_at_checked(length)?;
+    Some((str::from_utf8(header).ok()?.split_whitespace().collect(), data))
+}
+
+fn shape(header: &str) -> Option<Vec<usize>> {
+    let (_, rest) = header.split_once("'shape':(")?;
+    let (shape, _) = rest.split_once(')')?;
+    shape.split(',').map(|length| length.parse().ok()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn array(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let length = (header.len() as u16).to_le_bytes();
+        [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), data].concat()
+    }
+
+    #[test]
+    fn arrays_of_both_precisions_and_shapes_are_read() {
+        let numbers = [1.0, 2.0, 3.0, 4.0, 5.0, -6.5f32];
+        let single = numbers.map(f32::to_le_bytes).concat();
+        let double = numbers.map(|x| f64::from(x).to_le_bytes()).concat();
+        assert_eq!(read_npy(&array("<f4", "(1, 6)", &single)).unwrap(), numbers);
+        assert_eq!(read_npy(&array("<f8", "(1, 2, 3)", &double)).unwrap(), numbers);
+    }
+
+    #[test]
+    fn other_arrays_are_rejected_by_what_they_are() {
+        for (bytes, message) in [
+            (b"PK".to_vec(), "not an array"),
+            (array("<i8", "(1, 6)", &[0; 48]), "accepted: float32 or float64"),
+            (array(">f4", "(1, 6)", &[0; 24]), "accepted: float32 or float64"),
+            (array("<f4", "(2, 6)", &[0; 24]), "has 24 bytes of data"),
+            (array("<f8", "(1, 6)", &[0; 52]), "has 52 bytes of data"),
+            (array("<f4", "(1, 1, 6)", &[0; 24]), "accepted: (n, 6) or (n, 2, 3)"),
+            (array("<f4", "(6,)", &[0; 24]), "accepted: (n, 6) or (n, 2, 3)"),
+        ] {
+            let found = read_npy(&bytes).unwrap_err();
+            assert!(found.contains(message), "{found}");
+        }
+    }
+}
