@@ -20,7 +20,8 @@
 //! With k = 1, a sheared coordinate is off by less than 14.4 uR and an edge value by less than
 //! 4 · 14.4 uRm + 8.5 uRm and a square: less than e (m + e) with e = 128 uR. A difference of depths
 //! is off by 10 uR, X by 5EΔ / |a| + (55 + 17) uR, and the other terms together by 36 uR: less than
-//! e, too. So the bounds of f32 hold with 2kR for R. A half of the largest extent is never more than
+//! e, too. So the bounds of f32 hold with 2kR for R. Ends of a range are rounded to f32: beyond the
+//! slack |T − t| exceeds u|t|, so that t and the end itself are on the same sides. A half of the largest extent is never more than
 //! R, and so k is at most S over that half.
 
 use super::answer::{ANY_HIT, Bounded, NEAREST_HIT};
@@ -67,7 +68,8 @@ struct Boxed {
 
 impl DWideBvh {
     /// Lays out `tree`, valid over the [boxes](Self::boxes) of `triangles`, as [`WideBvh::new`]
-    /// does. Its frame should have its centre in the middle of the scene. O(n) time and memory.
+    /// does. Its frame should have its centre in the middle of the scene. Triangles that
+    /// [`DTriangle::check`] rejects have answers that are not exact. O(n) time and memory.
     pub fn new(tree: &Bvh, triangles: &[DTriangle]) -> Result<Self, InvalidBvh> {
         let frame = tree.frame.unwrap_or(Frame::FILE);
         let objects = InFrame { triangles, frame: Some(&frame) };

@@ -48,8 +48,9 @@
 //! subnormal. Hence a product beyond 8EΔ + (e + 2⁻¹²⁶|d_z|) |a| has the sign of the difference of T
 //! and the rounded distance, or that difference is 0 within the range. Below R = 2⁴⁰ nothing
 //! overflows but T d_z, which then has the right sign, and its products; other rays get an infinite
-//! bound. Without the term T d_z the sum is −ta d_z, off by no more: divided by |a d_z| with four
-//! roundings, where |a| is at least 3E and nothing underflows, it bounds t from both sides.
+//! bound. Without the term T d_z the sum is −ta d_z, off by no more: divided by |a d_z| with five
+//! roundings, where |a| is at least 3E and nothing underflows, it bounds t from both sides. The lower
+//! bound is not negative: `within` has the same sum with T d_z ≥ 0 beyond the slack.
 //!
 //! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at
 //! least the largest |x|, |y|, and the edge values are within E = e (S + e) with e = 64εR|d_z|, as
