@@ -385,7 +385,7 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         );
         let wrong = BvsSelect { orientation: 0, excluded_count: 1, excluded: null() };
         invalid(bvs_nearest_f64(tracer, &ray, &wrong, &mut hit), "excluded is null");
-        let rays = [ray, BvsRayF64 { origin: [0.0, 1e-300, 0.0], ..ray }];
+        let rays = [ray, BvsRayF64 { origin: [0.0, 1e300, 0.0], ..ray }];
         let batch = |rays, stride, hits| {
             bvs_tracer_nearest_hits_f64(tracer, rays, stride, 2, 0, null(), hits, 0)
         };
@@ -551,7 +551,7 @@ fn invalid_arguments_are_rejected_by_name() {
         let boxes_now = BvsObjects { count: 5, boxes: wrong.as_ptr(), ..BvsObjects::NONE };
         invalid(bvs_tree_update(tree, &boxes_now), "objects are 5 boxes; accepted: 5 triangles");
         invalid(bvs_tree_update(tree, &soup(&wrong)), "3");
-        let many = BvsBake { references: 17.0, ..NO_BAKE };
+        let many = BvsBake { references: 17.0, work: 1, ..NO_BAKE };
         rejected(bvs_tree_bake(&many).is_null(), "references is 17; accepted: 1 to 16");
         rejected(bvs_tree_bake(null()).is_null(), "bake is null");
         rejected(bvs_tree_nodes(tree, null_mut()).is_null(), "count is null");
