@@ -2,18 +2,12 @@
 //! type, order, strides and alignment. Errors name the argument, the value found and the values
 //! accepted.
 
+use crate::elements::{INTEGERS, Kinds, Number, REAL_NUMBERS, invalid};
 use crate::precision::{Precision, Real, with_precision};
 use bvh_search::bvh_core::MAX_OBJECTS;
 use bvh_search::{Objects, prelude::*};
 use numpy::{Element, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use std::fmt::Display;
-
-/// Creates the error of an invalid argument.
-pub fn invalid(message: impl Display) -> PyErr {
-    PyValueError::new_err(message.to_string())
-}
 
 /// A numpy array in row order, aligned and of native byte order. Only [`numbers`] makes one.
 ///
@@ -49,33 +43,6 @@ impl<'py, T: Element> Array<'py, T> {
         }
         Ok(numbers)
     }
-}
-
-/// The kinds of elements that are accepted, by numpy's letters, and their name.
-type Kinds = (&'static str, &'static str);
-
-const REAL_NUMBERS: Kinds = ("biuf", "real numbers");
-const INTEGERS: Kinds = ("iu", "integers");
-
-/// A type of elements, with its name in numpy and the kinds that are converted to it.
-pub trait Number: Element {
-    const DTYPE: &str;
-    const KINDS: Kinds;
-}
-
-impl Number for f32 {
-    const DTYPE: &str = "float32";
-    const KINDS: Kinds = REAL_NUMBERS;
-}
-
-impl Number for f64 {
-    const DTYPE: &str = "float64";
-    const KINDS: Kinds = REAL_NUMBERS;
-}
-
-impl Number for i64 {
-    const DTYPE: &str = "int64";
-    const KINDS: Kinds = INTEGERS;
 }
 
 /// Converts anything that numpy accepts as an array, and checks its shape. An array that has the

@@ -2,6 +2,7 @@
 
 mod answers;
 mod arrays;
+mod elements;
 mod improver;
 mod pickle;
 mod precision;

@@ -1,6 +1,6 @@
 //! The bytes in the pickle of a tree. A pickle may be forged, so every part is checked.
 
-use crate::arrays::invalid;
+use crate::elements::invalid;
 use crate::precision::Real;
 use crate::threads::detached;
 use bvh_search::bvh_core::DTriangle;

@@ -1,6 +1,6 @@
 //! What differs between trees over triangles in `float32` and in `float64`.
 
-use crate::arrays::{Number, invalid};
+use crate::elements::{Number, invalid};
 use bvh_search::OwnedTree;
 use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::bvh_core::{

@@ -1,6 +1,7 @@
 //! Reads the arrays of rays and points, and which triangles count for each ray.
 
-use crate::arrays::{Array, invalid, numbers};
+use crate::arrays::{Array, numbers};
+use crate::elements::invalid;
 use crate::precision::{Precision, Real};
 use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::bvh_core::{Orientation, Select, Traced};

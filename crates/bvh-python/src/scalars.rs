@@ -1,7 +1,7 @@
 //! Converts and checks arguments that are one number. Errors name the argument, the number found
 //! and the numbers accepted.
 
-use crate::arrays::invalid;
+use crate::elements::invalid;
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;

@@ -1,6 +1,6 @@
 //! Searches that let other Python threads run, and that end with their time or after Ctrl-C.
 
-use crate::arrays::invalid;
+use crate::elements::invalid;
 use crate::scalars::SECONDS;
 use crate::threads::{Follower, followed};
 use bvh_search::{Event, Observer, prelude::*};

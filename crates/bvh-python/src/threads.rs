@@ -1,6 +1,6 @@
 //! The threads of this module, which survive a fork.
 
-use crate::arrays::invalid;
+use crate::elements::invalid;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::prelude::*;

@@ -2,7 +2,8 @@
 //! threads.
 
 use crate::answers::{Call, Column, Hint, Reals, Rows};
-use crate::arrays::{invalid, numbers};
+use crate::arrays::numbers;
+use crate::elements::invalid;
 use crate::precision::{Precision, Real};
 use crate::rays::{RayArrays, Selection, points};
 use crate::threads::detached;

@@ -1,7 +1,8 @@
 //! The class `Tree`: trees over arrays, found, improved, measured, saved, loaded, and copied as
 //! nodes.
 
-use crate::arrays::{boxes, invalid, mesh_objects, moved_mesh, segments, triangles};
+use crate::arrays::{boxes, mesh_objects, moved_mesh, segments, triangles};
+use crate::elements::invalid;
 use crate::improver::Improver;
 use crate::pickle::{self, State};
 use crate::precision::Precision;
