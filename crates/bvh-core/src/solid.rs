@@ -111,9 +111,9 @@ impl Solid {
             InsideRule::Winding => false,
         };
         match &self.turns {
-            _ if is_by_parity => wide.by_crossings(points, inside, |hits| hits.count() % 2 == 1),
-            Turns::Signs(signs) => wide.by_crossings(points, inside, |hits| {
-                hits.map(|object| i64::from(signs[object as usize])).sum::<i64>() != 0
+            _ if is_by_parity => by_crossings(wide, points, inside, |ids| ids.len() % 2 == 1),
+            Turns::Signs(signs) => by_crossings(wide, points, inside, |ids| {
+                ids.iter().map(|&id| i64::from(signs[id as usize])).sum::<i64>() != 0
             }),
             Turns::Angles(winding) => {
                 let mut open = Open::default();
@@ -180,14 +180,9 @@ pub trait Traced {
     /// Returns the point in f64.
     fn double(point: Self::Point) -> DVec3;
 
-    /// Writes whether `is_inside` holds for the triangles that the half line from every point along
-    /// +x crosses.
-    fn by_crossings(
-        &self,
-        points: &[Self::Point],
-        inside: &mut [bool],
-        is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
-    );
+    /// Returns the triangles that the half line from every point along +x crosses, point after
+    /// point, and writes how many there are of each.
+    fn crossed(&self, points: &[Self::Point], counts: &mut [u32]) -> Vec<u32>;
 
     /// Writes the closest point of every point.
     fn closest_to(&self, points: &[Self::Point], closest: &mut [Option<Closest>]);
@@ -200,12 +195,7 @@ impl Traced for WideBvh {
         point.as_dvec3()
     }
 
-    fn by_crossings(
-        &self,
-        points: &[Vec3],
-        inside: &mut [bool],
-        is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
-    ) {
+    fn crossed(&self, points: &[Vec3], counts: &mut [u32]) -> Vec<u32> {
         // The half line must not end before a far wall: a mesh may be twice as wide as the largest
         // f32.
         let is_wide = self.bounds.max.x - self.bounds.min.x > f32::MAX;
@@ -218,10 +208,8 @@ impl Traced for WideBvh {
         };
         let rays: Vec<Ray> = points.iter().map(half_line).collect();
         let mut hits = Vec::new();
-        let mut counts = vec![0; rays.len()];
-        self.all_hits_of(&rays, &mut hits, &mut counts);
-        let hits: Vec<u32> = hits.iter().map(|hit| hit.object).collect();
-        tell(&hits, &counts, inside, is_inside);
+        self.all_hits_of(&rays, &mut hits, counts);
+        hits.iter().map(|hit| hit.object).collect()
     }
 
     fn closest_to(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
@@ -236,12 +224,7 @@ impl Traced for DWideBvh {
         point
     }
 
-    fn by_crossings(
-        &self,
-        points: &[DVec3],
-        inside: &mut [bool],
-        is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
-    ) {
+    fn crossed(&self, points: &[DVec3], counts: &mut [u32]) -> Vec<u32> {
         let half_line = |&point: &DVec3| {
             // A point beyond the range of all coordinates is outside: its range is empty.
             let ray = DRay::half_line(point, DVec3::X);
@@ -249,10 +232,8 @@ impl Traced for DWideBvh {
         };
         let rays: Vec<DRay> = points.iter().map(half_line).collect();
         let mut hits = Vec::new();
-        let mut counts = vec![0; rays.len()];
-        self.all_hits_of(&rays, &mut hits, &mut counts);
-        let hits: Vec<u32> = hits.iter().map(|hit| hit.object).collect();
-        tell(&hits, &counts, inside, is_inside);
+        self.all_hits_of(&rays, &mut hits, counts);
+        hits.iter().map(|hit| hit.object).collect()
     }
 
     fn closest_to(&self, points: &[DVec3], closest: &mut [Option<Closest>]) {
@@ -260,16 +241,19 @@ impl Traced for DWideBvh {
     }
 }
 
-/// Writes whether `is_inside` holds for the triangles that each half line crosses, so many of each.
-fn tell(
-    mut crossed: &[u32],
-    counts: &[u32],
+/// Writes whether `is_inside` holds for the triangles that the half line from every point crosses.
+fn by_crossings<L: Traced>(
+    wide: &L,
+    points: &[L::Point],
     inside: &mut [bool],
-    is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
+    is_inside: impl Fn(&[u32]) -> bool,
 ) {
-    for (inside, &count) in inside.iter_mut().zip(counts) {
+    let mut counts = vec![0; points.len()];
+    let crossed = wide.crossed(points, &mut counts);
+    let mut crossed = &crossed[..];
+    for (inside, count) in inside.iter_mut().zip(counts) {
         let of_point;
         (of_point, crossed) = crossed.split_at(count as usize);
-        *inside = is_inside(&mut of_point.iter().copied());
+        *inside = is_inside(of_point);
     }
 }

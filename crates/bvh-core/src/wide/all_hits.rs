@@ -37,14 +37,14 @@
 //! its bounds; no rounding decides an answer.
 
 use super::answer::{ANY_HIT, Find};
+use super::gathered::{Decided, hit_of};
 use super::instructions::{Instructions, Task};
-use super::lanes::{Lanes, Mask};
+use super::lanes::Lanes;
 use super::layout::{WideBvh, WideNode};
 use super::one_ray::{LeafRay, Leaves, traverse};
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
-use crate::exact::Line;
-use crate::{Coherence, Hit, Kernel, Ray, Triangle};
+use crate::{Coherence, Hit, Kernel, Ray};
 
 impl WideBvh {
     /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest
@@ -140,12 +140,6 @@ fn append_sorted(found: &[Found], hits: &mut Vec<Hit>, counts: &mut [u32]) {
         start = end;
     }
     hits.truncate(kept);
-}
-
-#[inline(always)]
-fn hit_of(ray: &Ray, line: &Line, object: u32, triangle: &Triangle) -> Option<Hit> {
-    let t = line.crossing(ray.ends(), &triangle.0, true)?;
-    (ray.t_min() <= t && t <= ray.t_max()).then_some(Hit { t, object })
 }
 
 /// Sorts the hits of one ray and moves each to the front once: a divided triangle is in several
@@ -255,47 +249,5 @@ impl<K: Instructions> Leaves<K> for AllHits<'_, K::Block> {
             }
         }
         false
-    }
-}
-
-/// The answers of a test in f64.
-pub(super) struct Decided {
-    hits: u32,
-    unsure: u32,
-    distances: [f32; 16],
-}
-
-impl Decided {
-    #[inline(always)]
-    pub(super) fn new<L: Lanes>((hits, unsure, t): (L::Mask, u32, L)) -> Self {
-        let mut distances = [0.0; 16];
-        // SAFETY: there is room for sixteen lanes.
-        unsafe { t.store(distances.as_mut_ptr()) };
-        Self { hits: hits.bits(), unsure, distances }
-    }
-
-    /// Returns the bits of a pair's distance above those of `object`; the greatest number if it is
-    /// no hit.
-    #[inline(always)]
-    pub(super) fn key(&self, pair: usize, object: u32) -> u64 {
-        let key = u64::from(self.distances[pair & 15].to_bits()) << 32 | u64::from(object);
-        if self.hits >> pair & 1 != 0 { key } else { u64::MAX }
-    }
-
-    /// Returns the hit of the pair in this lane, of a ray and a triangle of a block.
-    #[inline(always)]
-    pub(super) fn hit_of(
-        &self,
-        pair: usize,
-        block: &TriangleBlock,
-        lane: usize,
-        ray: &Ray,
-    ) -> Option<Hit> {
-        if self.unsure >> pair & 1 != 0 {
-            let (object, triangle) = block.triangle(lane)?;
-            return hit_of(ray, &ray.line(), object, &triangle);
-        }
-        let hit = Hit { t: self.distances[pair & 15], object: block.id(lane) };
-        (self.hits >> pair & 1 != 0).then_some(hit)
     }
 }

@@ -1,6 +1,6 @@
 //! What is asked of every ray of a batch, and where the answers go.
 
-use super::all_hits::Decided;
+use super::gathered::Decided;
 use super::instructions::Instructions;
 use super::layout::WideBvh;
 use super::ray_lanes::Rays;

@@ -29,7 +29,7 @@ use super::box_ray::{BoxRay, FarBoxRay};
 use super::double_block::{DoubleBlock, rounded_distance};
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{SPARE, STACK, deep_stacks};
-use super::lanes::{Aligned, DoubleLanes, Lanes};
+use super::lanes::{Aligned, Lanes};
 use super::layout::{WideBvh, WideNode};
 use super::one_ray::{LeafRay, Leaves, visit};
 use super::triangles::TriangleBlock;
@@ -42,7 +42,7 @@ use crate::{
 };
 use bytemuck::Zeroable;
 use core::mem::MaybeUninit;
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3};
 use std::borrow::Cow;
 
 /// An immutable copy of a tree and its triangles in f64, for tracing only.
@@ -54,8 +54,6 @@ pub struct DWideBvh {
     /// The triangles in f32, in the frame.
     pub(super) wide: WideBvh,
     pub(super) frame: Frame,
-    /// The columns of the frame's rotation, in lanes.
-    columns: [[f64; 4]; 3],
     /// By id.
     pub(super) triangles: Box<[DTriangle]>,
 }
@@ -91,9 +89,7 @@ impl DWideBvh {
             wide.bounds = framed.bounds;
             wide.near = framed.near;
         }
-        let [x, y, z] = frame.axes;
-        let columns = [0, 1, 2].map(|i| [x[i], y[i], z[i], 1.0]);
-        Ok(Self { wide, frame, columns, triangles: triangles.into() })
+        Ok(Self { wide, frame, triangles: triangles.into() })
     }
 
     /// Returns the boxes of triangles in a frame, to build a tree over.
@@ -185,34 +181,6 @@ impl DWideBvh {
         let ends = [ray.origin, ray.direction * unit];
         let ray = self.frame.ray_of(ends, [single(ray.t_min, unit), single(ray.t_max, unit)]);
         Boxed { ray, ends }
-    }
-
-    /// Returns the same, but for operations that are fused.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`, which has four lanes.
-    #[inline(always)]
-    unsafe fn boxed_by<L: Lanes>(&self, ray: &DRay) -> Boxed {
-        const { assert!(L::N == 4) };
-        let unit = ray.unit();
-        let ends = [ray.origin, ray.direction * unit];
-        let DVec3 { x, y, z } = ray.origin - self.frame.centre;
-        let DVec3 { x: dx, y: dy, z: dz } = ends[1];
-        // SAFETY: the processor has the instructions; there are four numbers.
-        unsafe {
-            let [a, b, c] = [
-                L::Double::load(self.columns[0].as_ptr()),
-                L::Double::load(self.columns[1].as_ptr()),
-                L::Double::load(self.columns[2].as_ptr()),
-            ];
-            let origin = c.mul_add(c.filled(z), b.mul_add(b.filled(y), a * a.filled(x)));
-            let direction = c.mul_add(c.filled(dz), b.mul_add(b.filled(dy), a * a.filled(dx)));
-            let inverse = a.filled(Frame::ABOVE) / direction;
-            let [t_min, t_max] = [single(ray.t_min, unit), single(ray.t_max, unit)];
-            let [origin, direction] = [vec3(L::single(origin)), vec3(L::single(direction))];
-            let inverse = vec3(L::single(inverse));
-            Boxed { ray: Ray::with_inverse(origin, direction, inverse, t_min, t_max), ends }
-        }
     }
 
     /// Finds the nearest hit that counts, or with `ANY` any. Returns whether there is one.
@@ -317,15 +285,6 @@ impl DWideBvh {
     }
 }
 
-/// Returns the first three of four lanes.
-#[inline(always)]
-fn vec3<L: Lanes>(lanes: L) -> Vec3 {
-    let mut numbers = [0.0; 4];
-    // SAFETY: there is room.
-    unsafe { lanes.store(numbers.as_mut_ptr()) };
-    Vec3::new(numbers[0], numbers[1], numbers[2])
-}
-
 /// Returns a distance of the form in f32.
 #[inline(always)]
 pub(super) fn single(t: f64, unit: f64) -> f32 {
@@ -349,7 +308,7 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
         let Self { layout, query, nearest } = self;
         // SAFETY: the processor has the instructions.
         unsafe {
-            let boxed = layout.boxed_by::<K::Block>(query.ray);
+            let boxed = layout.boxed(query.ray);
             let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &layout.wide);
             let mut leaves = Candidates::<_, ANY> { layout, leaf_ray, query, nearest };
             let hit = traverse::<K, ANY>(layout, &boxed, &mut leaves);
@@ -403,7 +362,7 @@ impl<K: Instructions> Task<K> for AllHits<'_> {
     unsafe fn run(self) {
         // SAFETY: the processor has the instructions.
         unsafe {
-            let boxed = self.layout.boxed_by::<K::Block>(self.ray);
+            let boxed = self.layout.boxed(self.ray);
             let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &self.layout.wide);
             let layout = self.layout;
             traverse::<K, ANY_HIT>(layout, &boxed, &mut AllCandidates { leaf_ray, hits: self });

@@ -1,10 +1,11 @@
 //! Pairs of a ray and a triangle that it may hit, gathered from anywhere and decided side by side.
 
-use super::all_hits::Decided;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, Mask};
 use super::pairs::{Crossings, Pairs};
 use super::prepared::Prepared;
 use super::triangles::{TriangleBlock, three_by_three};
+use crate::exact::Line;
+use crate::{Hit, Ray, Triangle};
 
 /// The maximum number of pairs.
 const PAIRS: usize = TriangleBlock::LANES * Gathered::RAYS;
@@ -119,4 +120,52 @@ impl Gathered {
             Decided::new((hits, 0, t))
         }
     }
+}
+
+/// The answers of a test in f64.
+pub(super) struct Decided {
+    hits: u32,
+    unsure: u32,
+    distances: [f32; 16],
+}
+
+impl Decided {
+    #[inline(always)]
+    pub(super) fn new<L: Lanes>((hits, unsure, t): (L::Mask, u32, L)) -> Self {
+        let mut distances = [0.0; 16];
+        // SAFETY: there is room for sixteen lanes.
+        unsafe { t.store(distances.as_mut_ptr()) };
+        Self { hits: hits.bits(), unsure, distances }
+    }
+
+    /// Returns the bits of a pair's distance above those of `object`; the greatest number if it is
+    /// no hit.
+    #[inline(always)]
+    pub(super) fn key(&self, pair: usize, object: u32) -> u64 {
+        let key = u64::from(self.distances[pair & 15].to_bits()) << 32 | u64::from(object);
+        if self.hits >> pair & 1 != 0 { key } else { u64::MAX }
+    }
+
+    /// Returns the hit of the pair in this lane, of a ray and a triangle of a block.
+    #[inline(always)]
+    pub(super) fn hit_of(
+        &self,
+        pair: usize,
+        block: &TriangleBlock,
+        lane: usize,
+        ray: &Ray,
+    ) -> Option<Hit> {
+        if self.unsure >> pair & 1 != 0 {
+            let (object, triangle) = block.triangle(lane)?;
+            return hit_of(ray, &ray.line(), object, &triangle);
+        }
+        let hit = Hit { t: self.distances[pair & 15], object: block.id(lane) };
+        (self.hits >> pair & 1 != 0).then_some(hit)
+    }
+}
+
+#[inline(always)]
+pub(super) fn hit_of(ray: &Ray, line: &Line, object: u32, triangle: &Triangle) -> Option<Hit> {
+    let t = line.crossing(ray.ends(), &triangle.0, true)?;
+    (ray.t_min() <= t && t <= ray.t_max()).then_some(Hit { t, object })
 }
