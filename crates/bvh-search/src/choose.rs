@@ -403,3 +403,58 @@ impl Chosen {
         tried(Tried::References, open.references, row > 0, divided, column);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bake_chooses_8000_nodes_per_object_up_to_half_a_million_and_never_less_than_800() {
+        let work = |objects| Budget::of_objects(objects).max_work.unwrap();
+        let expected = [0, 8_000, 4_000_000_000, 4_000_000_000, 4_000_000_800, 8_000_000_000];
+        let objects = [0, 1, 500_000, 5_000_000, 5_000_001, 10_000_000];
+        assert_eq!(objects.map(work), expected);
+        assert_eq!(Budget::of_objects(9).max_evaluations, None);
+    }
+
+    #[test]
+    fn every_choice_is_compared_with_its_alternative_other_things_being_equal() {
+        let anywhere: MadeRays = &|_, _, _| Ok(None);
+        let all =
+            Open { cost: true, references: true, anywhere: Some(anywhere), ..Open::default() };
+        // Area, the layout, and the layout for rays, of whole and of divided objects.
+        let tests = [100.0, 90.0, 80.0, 50.0, 40.0, 10.0];
+        let [layout, rays, divided] = [Tried::Layout, Tried::Rays, Tried::References];
+        for (open, tests, place, expected) in [
+            (
+                all,
+                &tests[..],
+                0,
+                &[(layout, false, 0.1), (rays, false, 1.0 / 9.0), (divided, false, 0.5)][..],
+            ),
+            (
+                all,
+                &tests,
+                1,
+                &[(layout, true, 0.1), (rays, false, 1.0 / 9.0), (divided, false, 5.0 / 9.0)],
+            ),
+            (all, &tests, 5, &[(layout, true, 0.8), (rays, true, 0.75), (divided, true, 0.875)]),
+            (
+                Open { references: false, ..all },
+                &tests[..3],
+                2,
+                &[(layout, true, 0.2), (rays, true, 1.0 / 9.0)],
+            ),
+            (Open { cost: true, ..Open::default() }, &[4.0, 5.0], 0, &[(layout, false, -0.25)]),
+        ] {
+            let mut chosen = Bake::new(&[]).choose(&Open::default(), None, &()).unwrap();
+            chosen.explain(&open, tests, place);
+            assert_eq!(chosen.reasons.len(), expected.len());
+            for (found, &(choice, is_chosen, saved)) in chosen.reasons.iter().zip(expected) {
+                let Reason::Tried { saved: found_saved, .. } = *found else { panic!("{found}") };
+                assert!((found_saved - saved).abs() < 1e-12, "{place}: {found_saved} {saved}");
+                assert_eq!(*found, Reason::Tried { choice, is_chosen, saved: found_saved });
+            }
+        }
+    }
+}

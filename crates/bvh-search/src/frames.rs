@@ -441,3 +441,93 @@ fn random_rotation(rng: &mut Stream) -> DQuat {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turn(axis: DVec3, degrees: f64) -> DQuat {
+        DQuat::from_axis_angle(axis.normalize(), degrees.to_radians())
+    }
+
+    #[test]
+    fn rotations_are_compared_up_to_those_of_a_cube() {
+        let quarters = [turn(DVec3::X, 90.0), turn(DVec3::Z, 180.0), turn(DVec3::ONE, 120.0)];
+        for (axis, degrees) in
+            [(DVec3::X, 10.0), (DVec3::new(1.0, 2.0, 3.0), 20.0), (DVec3::Z, 45.0)]
+        {
+            let rotation = turn(axis, degrees);
+            let half = (0.5 * degrees.to_radians()).cos();
+            for quarter in [DQuat::IDENTITY].iter().chain(&quarters) {
+                assert!((agreement(*quarter * rotation, DQuat::IDENTITY) - half).abs() < 1e-12);
+                assert!((smallest(*quarter * rotation).w - half).abs() < 1e-12, "{degrees}");
+            }
+        }
+        // No rotation is farther than 62.8 degrees.
+        let mut rng = stream(1, 0);
+        assert!(
+            (0..1000).all(|_| random_rotation(&mut rng).w > (0.5f64 * 62.9).to_radians().cos())
+        );
+    }
+
+    #[test]
+    fn triangles_tell_the_axes_of_their_right_angles_and_the_roots_of_their_areas() {
+        let oblique = turn(DVec3::new(1.0, -2.0, 0.5), 25.0);
+        let at = |corner: [f64; 3]| (oblique * DVec3::from(corner)).as_vec3();
+        let wall = Triangle([[0.0; 3], [4.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(at));
+        let (rotation, size) = told(&wall).unwrap();
+        assert!(
+            agreement(rotation, oblique.conjugate()) > 1.0 - 1e-12 && (size - 2.0).abs() < 1e-6
+        );
+        let needle = Triangle([[0.0; 3], [4.0, 0.0, 0.0], [2.0, 1e-4, 0.0]].map(at));
+        assert_eq!(told(&needle), None);
+        // Three walls of a room, and a smaller oblique one.
+        let room = [[0.0, 4.0, 0.0], [0.0, 0.0, 4.0]];
+        let room = [wall, Triangle([[0.0; 3], room[0], room[1]].map(at))];
+        let other = Triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.8, 0.6]].map(Vec3::from));
+        let found = directions(&[room[0], room[1], other]);
+        let share = (2.0 + 4.0) / (2.0 + 4.0 + 1.0);
+        assert!((found[0].1 - share).abs() < 1e-6 && found.len() == 2, "{found:?}");
+        assert!(agreement(found[0].0, oblique.conjugate()) > 1.0 - 1e-9);
+    }
+
+    #[test]
+    fn the_axes_of_a_surface_are_its_principal_ones() {
+        let oblique = turn(DVec3::new(0.3, 1.0, -0.4), 40.0);
+        // An ellipsoid of three different radii.
+        let at = |around: usize, up: usize| {
+            let [u, v] = [around, up].map(|part| std::f64::consts::TAU * part as f64 / 24.0);
+            let point = DVec3::new(3.0 * u.cos() * v.sin(), 2.0 * u.sin() * v.sin(), v.cos());
+            (oblique * point).as_vec3()
+        };
+        let quads = (0..24).flat_map(|around| (0..12).map(move |up| (around, up)));
+        let surface: Vec<Triangle> = quads
+            .flat_map(|(a, b)| {
+                let [p, q, r, s] = [at(a, b), at(a + 1, b), at(a + 1, b + 1), at(a, b + 1)];
+                [Triangle([p, q, r]), Triangle([p, r, s])]
+            })
+            .collect();
+        assert!(agreement(principal(&surface), oblique.conjugate()) > 1.0 - 1e-6);
+    }
+
+    #[test]
+    fn samples_are_runs_from_all_parts_and_frames_far_away_have_a_centre() {
+        let triangle = |x: usize| Triangle::from([[x as f32, 0.0, 0.0]; 3]);
+        let triangles: Vec<Triangle> = (0..1000).map(triangle).collect();
+        assert_eq!(sample(&triangles, 1000, 1, 0).len(), 1000);
+        for (count, run) in [(100, 1), (100, 10), (60, 20)] {
+            let places: Vec<f32> =
+                sample(&triangles, count, run, 0).iter().map(|triangle| triangle.0[0].x).collect();
+            assert_eq!(places.len(), count);
+            let part = (1000 * run) as f32 / count as f32;
+            for (number, run) in places.chunks(run).enumerate() {
+                assert!(run.windows(2).all(|pair| pair[1] == pair[0] + 1.0));
+                let begin = number as f32 * part;
+                assert!(run[0] % run.len() as f32 == 0.0 && run[0] >= begin - 20.0);
+                assert!(run[0] < begin + part + 20.0, "{number}: {run:?}");
+            }
+        }
+        let bounds = |low: f32| Aabb::from(([low; 3], [low + 2.0; 3]));
+        assert_eq!([1.0, 1.5].map(|low| centre(&bounds(low))), [DVec3::ZERO, DVec3::splat(2.5)]);
+    }
+}

@@ -214,6 +214,37 @@ mod tests {
     }
 
     #[test]
+    fn every_trial_has_the_stream_of_its_number_and_the_first_of_the_cheapest_wins() {
+        let boxes = scatter(100);
+        let problem = Problem::new(&boxes);
+        // More than one batch.
+        let config = Config { trials: 70, noise: Some(0.1), ..Config::default() };
+        let outcome = solve(&config, &problem, 9, Budget::UNLIMITED, &()).unwrap();
+        let scene = Presorted::new(&boxes).unwrap();
+        let (mut workspace, mut tree) = <(Workspace, Bvh)>::default();
+        let mut best: Option<(f64, Bvh)> = None;
+        for (number, event) in (0..).zip(&outcome.history) {
+            let rule = &mut Randomised::new(config.candidates, config.noise, stream(9, number));
+            let watch = &bvh_build::Watch::default();
+            let Config { construction, .. } = &config;
+            construction
+                .construct(&scene, None, Some(rule), &mut workspace, &mut tree, watch)
+                .unwrap();
+            let cost = problem.cost(&tree);
+            assert_eq!((event.cost, event.evaluations), (cost, number + 1));
+            if best.as_ref().is_none_or(|best| cost < best.0) {
+                best = Some((cost, tree.clone()));
+            }
+        }
+        assert_eq!((outcome.history.len(), outcome.work), (70, 70 * 199));
+        assert_eq!(Some((outcome.cost, outcome.tree)), best);
+        let costs = Mutex::default();
+        let wins = [(5, 3.0), (2, 4.0), (6, 3.0), (3, 4.0), (1, 3.0), (9, 2.0)];
+        let wins = wins.map(|(index, cost)| can_win(&costs, index, cost));
+        assert_eq!(wins, [true, true, false, false, true, true]);
+    }
+
+    #[test]
     fn local_search_improves_every_trial_and_its_work_is_counted_on_any_number_of_threads() {
         let boxes = scatter(500);
         let run = |local_search, threads: usize, max_work| {

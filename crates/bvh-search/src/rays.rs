@@ -147,6 +147,31 @@ mod tests {
     }
 
     #[test]
+    fn directions_are_uniform_and_every_second_ray_goes_on_before_the_hit_of_the_first() {
+        let rng = &mut Stream::seed_from_u64(3);
+        let directions: Vec<Vec3> = (0..20_000).map(|_| random_direction(rng)).collect();
+        assert!(directions.iter().all(|direction| (direction.length() - 1.0).abs() < 1e-6));
+        let mean = directions.iter().sum::<Vec3>() / 2e4;
+        let squares =
+            directions.iter().map(|direction| *direction * *direction).sum::<Vec3>() / 2e4;
+        assert!(mean.length() < 0.02, "{mean}");
+        assert!((squares - 1.0 / 3.0).abs().max_element() < 0.01, "{squares}");
+        let (triangles, _, tree) = walls();
+        let bounds = Aabb::union_of(&bvh_core::boxes(&triangles));
+        let segments = traced(&tree, &triangles, &bounds, 500, &|| false);
+        let mut bounces = 0;
+        for pair in segments.windows(2) {
+            let [from, end, next] = [pair[0].from, pair[0].to, pair[1].from].map(Vec3::from);
+            let is_bounce = next.distance(end) < 0.01;
+            bounces += usize::from(is_bounce);
+            assert!(!is_bounce || next.distance(from) < end.distance(from));
+            let inside = bounds.min - 1e-3;
+            assert!(next.cmpge(inside).all() && next.cmple(bounds.max + 1e-3).all());
+        }
+        assert!((100..250).contains(&bounces), "{bounces}");
+    }
+
+    #[test]
     fn fewer_rays_guard_a_density_where_all_of_them_meet_all_objects() {
         let triangle = Triangle::from([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
         let leaf = Node::leaf(triangle.aabb(), 0, 30_000);

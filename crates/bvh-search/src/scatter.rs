@@ -1,8 +1,10 @@
 //! Scenes and trees for the unit tests of searches.
 
+use crate::run::{Found, Observer, Problem, Run, Search};
 use crate::tree::{Area, Working};
 use bvh_build::Builder;
-use bvh_core::{Aabb, RayDensity, Segment};
+use bvh_config::Check;
+use bvh_core::{Aabb, Bvh, RayDensity, Segment};
 
 /// Returns a reproducible scatter of `n` small boxes.
 pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
@@ -29,4 +31,24 @@ pub(crate) fn density(boxes: &[Aabb]) -> Option<RayDensity> {
     let to = boxes.iter().flat_map(|aabb| [aabb.min, aabb.max]);
     let segments = to.map(|to| Segment { from: bounds.min.to_array(), to: to.to_array() });
     RayDensity::of_rays(&bounds, &segments.collect::<Vec<_>>(), 0.1).ok()
+}
+
+/// A search that is a function.
+pub(crate) struct Does<F>(pub F);
+
+impl<F> Check for Does<F> {}
+
+impl<F: Fn(&mut Run) -> Bvh> Search for Does<F> {
+    fn search(&self, _: &Problem, _: u64, run: &mut Run) -> Found {
+        Ok(self.0(run))
+    }
+}
+
+/// A clock that stands still.
+pub(crate) struct At(pub f64);
+
+impl Observer for At {
+    fn progress(&self) -> Option<f64> {
+        Some(self.0)
+    }
 }

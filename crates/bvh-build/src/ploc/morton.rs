@@ -80,6 +80,20 @@ mod tests {
         assert_eq!(spread([u64::MAX; 4]), [(0..21).map(|bit| 1 << (3 * bit)).sum::<u64>(); 4]);
     }
 
+    #[test]
+    fn codes_have_63_bits_with_x_first_and_reach_from_the_lowest_to_the_highest_corner() {
+        let point = |point: [f32; 3]| PackedAabb::from(&Aabb::from((point, point)));
+        let all = (1 << 63) - 1;
+        let x = 0x4924_9249_2492_4924;
+        let corners =
+            [[-1.0; 3], [3.0; 3], [3.0, -1.0, -1.0], [-1.0, 3.0, -1.0], [-1.0, -1.0, 3.0]];
+        assert_eq!(codes(&corners.map(point)), [0, all, x, x >> 1, x >> 2]);
+        // Other sides have the same spacing, and a side without length has one cell.
+        let flat = [[0.0; 3], [8.0, 4.0, 0.0]].map(point);
+        assert_eq!(codes(&flat), [0, x | 1 << 61]);
+        assert_eq!(codes(&[[5.0; 3]; 2].map(point)), [0, 0]);
+    }
+
     proptest! {
         #[test]
         fn objects_are_ordered_by_code_and_then_by_index(

@@ -14,6 +14,8 @@ pub(crate) mod schedule;
 mod side;
 mod single;
 mod subtrees;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use metropolis::cool;
 pub use single::Config;

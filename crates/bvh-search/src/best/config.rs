@@ -49,3 +49,35 @@ impl Config {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::{Budget, Observer, Problem, solve};
+    use crate::scatter::{At, Does};
+    use bvh_core::Bvh;
+
+    #[test]
+    fn the_end_is_known_by_a_clock_or_by_work_that_the_search_would_spend_anyway() {
+        use Horizon::{Known, Open};
+        let (clock, none): (&dyn Observer, &dyn Observer) = (&At(0.5), &());
+        for (horizon, max_work, observer, expected) in [
+            (None, None, none, (Open, 10_000)),
+            (None, Some(10_000), none, (Known, 10_000)),
+            (None, Some(10_001), none, (Open, 10_000)),
+            (None, None, clock, (Known, 10_000)),
+            (Some(Known), None, none, (Known, 10_000)),
+            (Some(Known), Some(50_000), none, (Known, 50_000)),
+            (Some(Known), None, clock, (Known, u64::MAX)),
+            (Some(Open), Some(5), none, (Open, 5)),
+        ] {
+            let config = Config { work_per_object: 1000, horizon, ..Config::default() };
+            let search = Does(|run: &mut Run| {
+                assert_eq!(config.horizon(10, run), expected, "{horizon:?} {max_work:?}");
+                Bvh::default()
+            });
+            let budget = Budget { max_work, ..Budget::UNLIMITED };
+            solve(&search, &Problem::new(&[]), 1, budget, observer).unwrap();
+        }
+    }
+}

@@ -441,3 +441,32 @@ impl Observer for Until<'_> {
         self.observer.progress()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_has_equal_long_runs_and_short_ones_after_those_that_are_long_enough() {
+        assert_eq!([500.0, 1000.0, 1e6].map(hot), [0.01, 0.02, 0.2]);
+        let short = [0.14, 0.07, 0.07, 0.07, 0.07, 0.07, 0.07];
+        for (length, n, most, each, hots, ends) in [
+            (6999.0, 1_000_000, 6, 6999.0, &[0.139_98][..], &[1.0][..]),
+            (7000.0, 1_000_000, 6, 7000.0, &short, &[0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0]),
+            (7000.0, 1_000_000, 0, 7000.0, &short[..1], &[1.0]),
+            (7000.0, 1_000_000, 1, 7000.0, &short[..2], &[0.7, 1.0]),
+            // Ten objects get 2000 at once.
+            (5000.0, 10, 6, 5000.0 / 3.0, &[1.0 / 30.0; 3], &[1.0 / 3.0, 2.0 / 3.0, 1.0]),
+        ] {
+            let (plan, found) = plan(length, n, most);
+            let close = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
+            assert!(close(found, each) && plan.len() == hots.len(), "{length} {n} {most}");
+            for (planned, (hot, end)) in plan.iter().zip(hots.iter().zip(ends)) {
+                assert!(close(planned.hot, *hot) && close(planned.until, *end), "{length} {n}");
+            }
+        }
+        let (plan, each) = plan(250_000.0, 1_000_000, 6);
+        assert_eq!((plan.len(), each), (21, 250_000.0 / 3.0));
+        assert!(plan.is_sorted_by(|a, b| a.until < b.until) && plan[6].until == 1.0 / 3.0);
+    }
+}

@@ -181,3 +181,28 @@ impl Config {
         Ok(best.tree)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scatter::scatter;
+
+    #[test]
+    fn reinsertion_stands_by_within_little_and_within_much_work() {
+        let boxes = scatter(50);
+        for (per_object, is_used) in
+            [(299.9, true), (300.0, false), (19_999.9, false), (20_000.0, true)]
+        {
+            let found = fallback(&Problem::new(&boxes), (per_object * 50.0) as u64, &()).unwrap();
+            assert_eq!(found.is_some(), is_used, "{per_object}");
+        }
+        let search = |work| fallback(&Problem::new(&boxes), work, &()).unwrap().unwrap();
+        let (early, late) = (search(0), search(14_999));
+        assert!(late.cost < early.cost);
+        let [cost, work] = [late.cost, early.work as f64];
+        let better = unless_behind(early.clone(), Some(late.clone()));
+        assert_eq!([better.cost, better.work as f64], [cost, work]);
+        assert_eq!(better.tree, late.tree);
+        assert_eq!(unless_behind(late.clone(), Some(early)).tree, late.tree);
+    }
+}

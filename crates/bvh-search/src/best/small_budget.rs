@@ -128,3 +128,47 @@ fn select_largest(tree: &Working, part: f64, order: &mut Vec<u32>) {
     order.clear();
     order.extend(keyed.into_iter().map(|(_, index)| index));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::{Budget, Quota, solve};
+    use crate::scatter::{At, Does, built, scatter};
+
+    #[test]
+    fn the_largest_of_the_first_nodes_are_selected_in_order() {
+        let tree = built(&CLUSTERING, &scatter(100));
+        for (part, count) in [(0.0, 1), (0.01, 1), (0.1, 19), (0.5, 99), (1.0, 199)] {
+            let mut order = vec![7];
+            select_largest(&tree, part, &mut order);
+            let area = |index: &u32| tree.nodes[*index as usize].area;
+            let mut expected: Vec<u32> = (1..200.min(1 + (FRONT * count) as u32)).collect();
+            expected.sort_by(|a, b| area(b).total_cmp(&area(a)));
+            assert_eq!(order, expected[..count], "{part}");
+        }
+    }
+
+    #[test]
+    fn the_largest_nodes_are_reinserted_to_a_local_optimum_unless_the_time_is_over() {
+        let mut tree = built(&CLUSTERING, &scatter(300));
+        let begin = tree.area();
+        let mut reached = |at: f64| {
+            let ends = std::sync::Mutex::new((tree.clone(), false));
+            let search = Does(|run: &mut Run| {
+                let (tree, is_optimal) = &mut *ends.lock().unwrap();
+                *is_optimal = reinsert_largest(tree, 0.5, run);
+                tree.to_bvh()
+            });
+            let observer = At(at);
+            solve(&search, &Problem::new(&[]), 1, Budget::UNLIMITED, &observer).unwrap();
+            let is_optimal;
+            (tree, is_optimal) = ends.into_inner().unwrap();
+            (is_optimal, tree.area())
+        };
+        assert_eq!(reached(0.5), (false, begin));
+        let (is_optimal, area) = reached(0.4);
+        assert!(is_optimal && area < begin);
+        let again = crate::local::reinsertion::pass_by_area(&mut tree, Quota::ENDLESS, &());
+        assert_eq!(again.kept, 0);
+    }
+}

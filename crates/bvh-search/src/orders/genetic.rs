@@ -258,6 +258,42 @@ mod tests {
     }
 
     #[test]
+    fn the_fitter_wins_and_pairs_and_mutants_are_as_many_as_their_probabilities_say() {
+        let rng = &mut stream(1, 0);
+        let pair = [individual(1.0), individual(2.0)];
+        let population: Vec<Individual> = pair.iter().cycle().take(4000).cloned().collect();
+        let winners = select(&population, rng);
+        let fitter = winners.iter().filter(|winner| winner.cost == 1.0).count();
+        assert!(
+            (2850..3150).contains(&fitter),
+            "{fitter} of 4000 where three of four are expected"
+        );
+        let fresh = |rng: &mut Stream| Individual {
+            order: random_order(1000, rng),
+            cost: 0.0,
+            evaluated: true,
+        };
+        for (probability, expected) in [(0.0, 0..=0), (0.5, 80..=120), (1.0, 198..=200)] {
+            let mut parents: Vec<Individual> = (0..200).map(|_| fresh(rng)).collect();
+            cross(&mut parents, probability, &mut vec![false; 1000], rng);
+            let children = parents.iter().filter(|parent| !parent.evaluated).count();
+            assert!(expected.contains(&children), "{probability}: {children}");
+        }
+        // From 0 to 4 swaps, each equally likely.
+        let mut kept = 0;
+        let mut moved = 0;
+        for _ in 0..2000 {
+            let mut mutant = fresh(rng);
+            let before = mutant.order.clone();
+            mutate(&mut mutant, 0.002, rng);
+            kept += usize::from(mutant.evaluated);
+            moved += before.iter().zip(&mutant.order).filter(|(a, b)| a != b).count();
+        }
+        assert!((330..470).contains(&kept), "{kept} of 2000 where a fifth is expected");
+        assert!((7500..8500).contains(&moved), "{moved} places where four of each are expected");
+    }
+
+    #[test]
     fn the_best_takes_the_place_of_the_least_fit() {
         let mut population = [3.0, 5.0, 4.0].map(individual);
         keep(&individual(2.0), &mut population);

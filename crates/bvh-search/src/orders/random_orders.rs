@@ -49,3 +49,34 @@ impl Search for Config {
         Ok(best)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::{Budget, solve};
+    use bvh_core::cost::Objective;
+
+    #[test]
+    fn every_trial_has_the_stream_of_its_number_and_the_cheapest_tree_is_returned() {
+        let boxes = crate::scatter::scatter(60);
+        for objective in [Objective::GoldsmithSalmon, Objective::InternalArea] {
+            let problem = Problem { objective, ..Problem::new(&boxes) };
+            // More than one batch.
+            let config = Config { trials: 150, ..Config::default() };
+            let outcome = solve(&config, &problem, 4, Budget::UNLIMITED, &()).unwrap();
+            let insertion = Insertion::new(&problem, &config.insertion).unwrap();
+            let costs: Vec<f64> = (0..150)
+                .map(|trial| {
+                    let order = random_order(60, &mut stream(4, trial));
+                    problem.cost(&insertion.tree(&order, &()).unwrap())
+                })
+                .collect();
+            let close = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-12;
+            let found = outcome.history.iter().map(|event| event.cost);
+            assert!(outcome.history.len() == 150 && found.zip(&costs).all(|(a, b)| close(a, *b)));
+            let least = costs.into_iter().fold(f64::INFINITY, f64::min);
+            assert!(close(outcome.cost, least) && close(problem.cost(&outcome.tree), least));
+            assert_eq!(outcome.work, 150 * 120);
+        }
+    }
+}

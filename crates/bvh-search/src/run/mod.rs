@@ -8,6 +8,8 @@ mod error;
 mod observer;
 mod problem;
 mod stream;
+#[cfg(test)]
+mod tests;
 
 pub use budget::{Budget, Quota, StopReason, Tally};
 use bvh_build::ploc::Config as Clustering;
