@@ -117,6 +117,7 @@ fn reasons_are_lines() {
             format!("cost: the wide layout's: yes, 5.1 % fewer {tests}"),
         ),
         (tried(Tried::Rays, false, -0.02), format!("rays: default: no, 2.0 % more {tests}")),
+        (tried(Tried::Rays, false, 0.0), format!("rays: default: no, 0.0 % fewer {tests}")),
     ] {
         assert_eq!(line, expected);
     }
