@@ -8,7 +8,8 @@ use bvh_search::bvh_core::glam::{DMat3, DVec3, EulerRot};
 use bvh_search::bvh_core::{
     DHit, DRay, DTriangle, DWideBvh, Frame, InFrame, Primitives, Select, validate_references,
 };
-use bvh_search::{Choice, Frames, Objects, Options, OwnedTree, prelude::*};
+use bvh_search::{Choice, Frames, Objects, Observer, Options, OwnedTree, prelude::*};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 fn triangles(scene: &str) -> Vec<Triangle> {
     Scene::load(scene).unwrap().triangles().unwrap().to_vec()
@@ -75,14 +76,33 @@ fn scenes_along_their_axes_and_budgets_of_nothing_keep_their_bytes() {
         });
         assert!(auto == file, "{most}");
     }
-    let deadline = Deadline::after(Duration::from_secs(2));
-    assert!(Choice::of(&oblique, Budget::UNLIMITED, &deadline).frame.is_some());
-    // A tenth, but other tests share the machine.
-    assert!(deadline.elapsed() < Duration::from_secs(1), "{:?}", deadline.elapsed());
     let over = Deadline::after(Duration::ZERO);
     assert_eq!(Choice::of(&oblique, Budget::UNLIMITED, &over), Choice::FILE);
-    let cancelled = core::sync::atomic::AtomicBool::new(true);
+    let cancelled = AtomicBool::new(true);
     assert_eq!(Choice::of(&oblique, Budget::UNLIMITED, &cancelled), Choice::FILE);
+}
+
+/// A clock by which every look takes the same share of all time.
+struct Clock(f64, AtomicU32);
+
+impl Observer for Clock {
+    fn progress(&self) -> Option<f64> {
+        Some(self.0 * f64::from(self.1.fetch_add(1, Relaxed)))
+    }
+}
+
+#[test]
+fn a_clock_gives_a_choice_the_work_that_its_first_price_tells() {
+    let oblique = turned(&triangles("escher"), 1, 1.0, DVec3::ZERO);
+    // A sample of 1024 triangles is priced between two looks, with 20 units of work for each. Larger
+    // samples may take twice the time per triangle.
+    let worth = |share: f64| work((20.0 * 1024.0 / (2.0 * share)) as u64);
+    for (share, finds) in [(0.001, true), (0.0005, true), (0.1, false)] {
+        let choice = Choice::of(&oblique, Budget::UNLIMITED, &Clock(share, AtomicU32::new(0)));
+        assert_eq!(choice, Choice::of(&oblique, worth(share), &()));
+        assert_eq!(choice.frame.is_some(), finds, "{share}: {choice:?}");
+        assert!(!finds || choice != Choice::of(&oblique, worth(share / 2.0), &()), "{share}");
+    }
 }
 
 #[test]
