@@ -9,6 +9,7 @@
 //! The queries are described in `queries/mod.rs`. Here is also what holds of all pages: widths,
 //! links, and the length of the README.
 
+mod columns;
 mod numbers;
 mod queries;
 mod support;
@@ -183,15 +184,17 @@ fn tables(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn a_file_name_means_the_same_columns_in_every_experiment() {
+fn a_file_name_means_the_same_columns_in_every_experiment_and_a_page_describes_them() {
     let mut paths = Vec::new();
     tables(&top().join("results"), &mut paths);
     assert!(paths.len() > 100, "{} tables", paths.len());
     let mut headers = BTreeMap::new();
     for path in paths {
         let header = csv::Reader::from_path(&path).unwrap().headers().unwrap().clone();
-        let known =
-            headers.entry(path.file_name().unwrap().to_owned()).or_insert_with(|| header.clone());
+        let header: Vec<String> = header.iter().map(String::from).collect();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let known = headers.entry(name).or_insert_with(|| header.clone());
         assert_eq!(*known, header, "{}", path.display());
     }
+    assert_current(&top().join("docs/COLUMNS.md"), &columns::page(&headers), "docs");
 }

@@ -48,7 +48,9 @@ pub(super) struct Reached<'a> {
     scene: &'a str,
     target: String,
     method: &'a str,
+    /// All runs.
     runs: usize,
+    /// Runs that reach the target.
     solved: usize,
     /// Median over all runs, counting runs that never reach the target as last; empty if such a run
     /// is the median.

@@ -30,11 +30,11 @@ pub(super) struct Compared<'a> {
     camera: &'a str,
     /// Tests of nodes and of blocks of triangles together.
     tests: Option<f64>,
-    /// Over the base's.
+    /// `tests` over the base's.
     tests_over_base: f64,
     /// Lower end of the 95 % interval, from the standard errors of both over the repetitions.
     over_base_low: Option<f64>,
-    /// The upper end.
+    /// Its upper end.
     over_base_high: Option<f64>,
 }
 
@@ -51,7 +51,7 @@ pub(super) struct Paired<'a> {
     tests_over_other: f64,
     /// Lower end of the 95 % interval, from the standard errors of both over the repetitions.
     low: Option<f64>,
-    /// The upper end.
+    /// The upper end of `low`'s interval.
     high: Option<f64>,
     /// `fewer` if the interval lies below 1, `more` if above; `inconclusive` if it holds 1, or if
     /// there is none.

@@ -1,17 +1,8 @@
 //! The rows of the CSV files: flat, units in the names, full precision.
 //!
-//! Columns mean the same in every file. `docs/EXPERIMENTS.md` describes those of `runs.csv`, which
-//! are not described again, and neither are these:
-//!
-//! | column | meaning |
-//! |---|---|
-//! | `threads` | Number of the run's threads. |
-//! | `collapsed_sah` | Surface area heuristic with both constants 1, after the best collapse of leaves. |
-//! | `rays`, `judged_on`, `trained_on` | Kinds of rays: traced, judging the tree, training it. |
-//! | `camera` | Camera of the judging rays: `same` as in training, `other`, or `none`. |
-//! | `boxes_per_ray`, `objects_per_ray` | Mean number of tests; `boxes_low` and `boxes_high` end its 95 % interval. |
-//! | `references_per_object` | Leaves that name an object, per object: above 1 where objects are divided. |
-#![allow(missing_docs, reason = "columns in the table above, or whose names are clear")]
+//! Columns mean the same in every file: a comment on the first field of a name holds for the others.
+//! `docs/COLUMNS.md` is made of these comments.
+#![allow(missing_docs, reason = "columns that are described at their first occurrence")]
 
 pub mod csv_file;
 pub mod kept_run;
@@ -44,15 +35,23 @@ macro_rules! rows {
 rows! {
     /// One row of `runs.csv`: what one run of one method on one scene found.
     RunRow in "runs.csv" {
+        /// Name of the scene.
         scene: String,
+        /// `stand-in`, `procedural` or `file`.
         scene_kind: String,
+        /// Label of the method in the spec.
         method: String,
+        /// Seed of the run.
         seed: u64,
+        /// Number of the repetition, from 0.
         repetition: u32,
+        /// Number of the scene's objects.
         objects: usize,
+        /// Trees or moves evaluated.
         evaluations: u64,
+        /// Nodes made or visited.
         work: u64,
-        /// Reason to stop.
+        /// Reason to stop: `completed`, `optimal`, `evaluations`, `work` or `cancelled`.
         stop: bvh_search::StopReason,
         /// The objective's value for the best tree found.
         cost: f64,
@@ -65,10 +64,13 @@ rows! {
         cost_over_root_area: f64,
         /// The paper's objective: total half area of inner nodes, world units squared.
         internal_area: f64,
+        /// Boxes below the root that a random line through the root's box is tested against.
         goldsmith_salmon: f64,
         /// The surface area heuristic with both constants 1.
         sah: f64,
+        /// Nodes of the tree, 2n − 1 for a binary tree of n whole objects.
         nodes: usize,
+        /// Edges from the root to the deepest leaf.
         depth: usize,
     }
 
@@ -104,6 +106,7 @@ rows! {
         method: String,
         seed: u64,
         repetition: u32,
+        /// Number of the run's threads.
         threads: usize,
         /// Wall time of the whole run.
         seconds: f64,
@@ -140,8 +143,11 @@ rows! {
         boxes_per_ray: f64,
         /// Standard error of `boxes_per_ray`.
         boxes_standard_error: f64,
+        /// Lower end of the 95 % interval of `boxes_per_ray`.
         boxes_low: f64,
+        /// Its upper end.
         boxes_high: f64,
+        /// Mean number of tests against objects.
         objects_per_ray: f64,
         /// Standard error of `objects_per_ray`.
         objects_standard_error: f64,
@@ -179,6 +185,7 @@ rows! {
         scene: String,
         method: String,
         repetition: u32,
+        /// Kind of the rays.
         rays: String,
         /// The Goldsmith–Salmon cost by the density of these rays.
         goldsmith_salmon: f64,
@@ -202,9 +209,11 @@ rows! {
         method: String,
         /// Trees that the numbers are means over.
         repetitions: usize,
+        /// Leaves that name an object, per object: above 1 where objects are divided.
         references_per_object: f64,
         /// Bytes of the wide layout per object.
         bytes_per_object: f64,
+        /// Surface area heuristic with both constants 1, after the best collapse of leaves.
         collapsed_sah: f64,
         /// Nodes and blocks of triangles that a random line through the root's box is expected to
         /// visit.
