@@ -176,7 +176,7 @@ impl OwnedTree {
     /// objects, as [`TreeFile::tree_over`] does.
     pub fn load(objects: Objects, bytes: &[u8]) -> Result<Self, FileError> {
         let mut owned = Self::bare(objects, None);
-        let file = TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
+        let file = TreeFile::open(bytes)?.for_objects(&owned.boxes, owned.shapes.as_ref())?;
         owned.tree = file.tree_over(&owned.boxes, owned.shapes.as_ref(), &parallel::call_both)?;
         if let Some(frame) = owned.tree.frame {
             let shapes = owned.shapes.as_ref().ok_or(FileError::Frame)?;
