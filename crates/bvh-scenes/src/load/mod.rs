@@ -11,7 +11,7 @@ mod stl;
 mod text;
 
 use crate::files::{ReadError, read};
-use mesh::{Fault, Mesh};
+use mesh::{Fault, FromFile, Mesh};
 pub use orient::{Find, Oriented, orient};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -88,12 +88,21 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
 /// A glTF file may refer to files in its folder and below. Takes O(bytes) time, and a few hundred
 /// bytes of memory per triangle besides the file.
 pub fn load(path: &Path) -> Result<Mesh, MeshError> {
-    parse(&read(path)?, path)
+    load_as(path)
+}
+
+/// Reads the mesh file at `path` as triangles in f32 or f64.
+pub(crate) fn load_as<T: FromFile>(path: &Path) -> Result<Mesh<T>, MeshError> {
+    parse_as(&read(path)?, path)
 }
 
 /// Reads the bytes of a mesh file as [`load`] does. `path` names the file in errors, and a glTF
 /// file's references are relative to its folder.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
+    parse_as(bytes, path)
+}
+
+fn parse_as<T: FromFile>(bytes: &[u8], path: &Path) -> Result<Mesh<T>, MeshError> {
     let is_utf_16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
     let parsed = match Format::of(bytes, path) {
         _ if bytes.trim_ascii().is_empty() => {

@@ -1,53 +1,38 @@
 //! Reads the triangles of a Wavefront OBJ file, or reports the first invalid line.
 //!
-//! `tobj` parses the numbers and resolves relative indices. It receives only the `v` and `f`
-//! statements that `Geometry` finds, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle,
-//! skips the first vertex after a byte order mark, and rejects Latin-1 comments, comments at the end
-//! of a line, continued lines, and files in which only some vertices have a colour. Its errors name
-//! no line. `Geometry` therefore checks every number before `tobj` receives it. `tobj` would make
-//! fans of polygons, so that `Polygons` splits them instead.
+//! This module does not use `tobj` 4.0.5, because that crate reads a polyline `l 1 2 3` as a
+//! triangle, skips the first vertex after a byte order mark, makes fans of polygons, has numbers of
+//! one precision, and rejects Latin-1 comments, comments at the end of a line, continued lines, and
+//! files in which only some vertices have a colour. Its errors name no line.
 //!
 //! Points, lines, curves, names, groups, materials (whose files are never opened), normals and
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
 //! continues a statement on the next line.
 
-use super::mesh::{Fault, Mesh, Rounding, counted};
+use super::mesh::{Fault, FromFile, Mesh, Rounding, counted};
 use super::polygon::{MOST_CORNERS, Polygons};
 use super::text::{self, number, shown};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Reads the bytes of an OBJ file. Any bytes give a mesh or an error. O(bytes), and more for faces
 /// that are not convex.
-pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let geometry = Geometry::of(bytes)?;
-    let options =
-        tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
-    // No statement names a material, so that `tobj` asks for no material file.
-    let no_material = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-    let loaded = tobj::load_obj_buf(&mut &geometry.text[..], &options, no_material);
-    let (models, _) = loaded
-        .map_err(|error| Fault::of_file(format!("{error}; expected a Wavefront OBJ file")))?;
-    // Nothing divides the statements, so that there is one model at most.
-    let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
-    // `tobj` keeps exactly the vertices that faces use, and names no lengths of faces if all are
-    // triangles.
-    let mut polygons = Polygons::new(mesh.positions.as_chunks().0);
-    let mut indices = &mesh.indices[..];
-    let mut arities = mesh.face_arities.iter();
-    for &line in &geometry.lines {
-        let (face, rest) = indices.split_at(arities.next().map_or(3, |&arity| arity as usize));
-        polygons.add(face).map_err(|message| Fault::in_line(line, format!("face: {message}")))?;
-        indices = rest;
+pub fn parse<T: FromFile>(bytes: &[u8]) -> Result<Mesh<T>, Fault> {
+    let geometry = Geometry::<T>::of(bytes)?;
+    let mut polygons = Polygons::new(&geometry.vertices);
+    let starts = [0].iter().chain(&geometry.ends);
+    for ((&start, &end), &line) in starts.zip(&geometry.ends).zip(&geometry.lines) {
+        polygons
+            .add(&geometry.corners[start..end])
+            .map_err(|message| Fault::in_line(line, format!("face: {message}")))?;
     }
     if polygons.triangles.is_empty() {
-        let found = format!("{} vertices and no face of three or more", geometry.vertices);
+        let found = format!("{} vertices and no face of three or more", geometry.vertices.len());
         let message = format!("{found}; expected a Wavefront OBJ file with at least one such face");
         return Err(Fault::of_file(message));
     }
     polygons.short += geometry.short_faces;
-    let mut remarks = polygons.remarks(geometry.vertices);
+    let mut remarks = polygons.remarks(geometry.vertices.len());
     remarks.extend(geometry.unknown);
     remarks.extend(geometry.rounding.remark(&polygons.triangles));
     Ok(Mesh::new(polygons.triangles, remarks))
@@ -85,14 +70,15 @@ pub fn turned(bytes: &[u8], rotation: &DMat3) -> Result<Vec<u8>, Fault> {
 }
 
 /// The checked statements of a file.
-#[derive(Default)]
-struct Geometry {
-    /// The statements for `tobj`.
-    text: Vec<u8>,
-    /// The line of each face in `text`.
+struct Geometry<T> {
+    /// The position of each `v` statement, divided by its weight.
+    vertices: Vec<DVec3>,
+    /// The vertices of all faces, counted from 0, one face after the other.
+    corners: Vec<i64>,
+    /// The end of each face in `corners`.
+    ends: Vec<usize>,
+    /// The line of each face.
     lines: Vec<usize>,
-    /// The number of `v` statements.
-    vertices: usize,
     /// The number of `f` statements with fewer than three vertices, which are skipped.
     short_faces: usize,
     /// The clause about lines that begin with no keyword.
@@ -101,10 +87,10 @@ struct Geometry {
     invalid: BTreeMap<usize, Fault>,
     /// The vertices below a face that the face names, counted from 1, and the face's line.
     ahead: Vec<(usize, usize)>,
-    rounding: Rounding,
+    rounding: Rounding<T>,
 }
 
-impl Geometry {
+impl<T: FromFile> Geometry<T> {
     /// Checks the statements of a file.
     ///
     /// # Errors
@@ -112,7 +98,17 @@ impl Geometry {
     /// The first fault in the order of the file. A fault of a vertex below the face that names it
     /// is found only at the end of the file, and is reported last.
     fn of(bytes: &[u8]) -> Result<Self, Fault> {
-        let mut geometry = Self::default();
+        let mut geometry = Self {
+            vertices: Vec::new(),
+            corners: Vec::new(),
+            ends: Vec::new(),
+            lines: Vec::new(),
+            short_faces: 0,
+            unknown: None,
+            invalid: BTreeMap::new(),
+            ahead: Vec::new(),
+            rounding: Rounding::default(),
+        };
         let mut statements = Statements::new(bytes);
         let mut words = Vec::new();
         while let Some((keyword, line)) = statements.next(&mut words) {
@@ -122,8 +118,8 @@ impl Geometry {
             }
         }
         for &(vertex, line) in &geometry.ahead {
-            if vertex > geometry.vertices {
-                let most = geometry.vertices;
+            let most = geometry.vertices.len();
+            if vertex > most {
                 let expected = format!("expected at most {most}, the file's vertex count");
                 return Err(Fault::in_line(line, format!("face vertex {vertex}; {expected}")));
             }
@@ -138,7 +134,6 @@ impl Geometry {
 
     /// Adds a vertex without its colour: its coordinates, and its weight if it has one.
     fn add_vertex(&mut self, words: &[&[u8]], line: usize) -> Result<(), Fault> {
-        self.vertices += 1;
         let length = words.len();
         if !matches!(length, 3 | 4 | 6..=8) {
             let expected = "3 (x y z), 4 (x y z and a weight), or 3 or 4 more (a colour)";
@@ -162,17 +157,14 @@ impl Geometry {
         for (place, word) in words.iter().enumerate() {
             numbers[place] = number(word, &mut self.rounding).ok_or_else(|| fault(place))?;
         }
-        // `tobj` divides by the weight, and x / ∞ is finite.
-        let [position @ .., weight] = numbers;
-        let is_divisible = position.iter().all(|x| (x / weight).is_finite());
+        let [x, y, z, weight] = numbers;
+        let position = DVec3::new(x, y, z).map(|x| T::round(x / weight));
+        // A number that is divided by ∞ is finite.
         let infinite = numbers.iter().position(|number| !number.is_finite());
-        match infinite.or((!is_divisible).then_some(3)) {
-            None => self.add(b'v', words.iter().copied()),
-            Some(place) => {
-                // Some programs write vertices that they do not use in this way.
-                self.invalid.insert(self.vertices, fault(place));
-                self.text.extend(b"v 0 0 0\n");
-            }
+        self.vertices.push(position);
+        if let Some(place) = infinite.or((!position.is_finite()).then_some(3)) {
+            // Some programs write vertices that they do not use in this way.
+            self.invalid.insert(self.vertices.len(), fault(place));
         }
         Ok(())
     }
@@ -183,7 +175,8 @@ impl Geometry {
                 format!("face of more than {MOST_CORNERS} vertices; expected at most as many");
             return Err(Fault::in_line(line, message));
         }
-        let vertices = self.vertices;
+        let vertices = self.vertices.len();
+        let start = self.corners.len();
         for corner in words {
             let index: isize = std::str::from_utf8(vertex_index(corner))
                 .ok()
@@ -205,24 +198,16 @@ impl Geometry {
                 self.ahead.push((vertex, line));
             }
             self.check(vertex)?;
+            self.corners.push(vertex as i64 - 1);
         }
         if words.len() < 3 {
             self.short_faces += 1;
+            self.corners.truncate(start);
         } else {
-            self.add(b'f', words.iter().map(|word| vertex_index(word)));
+            self.ends.push(self.corners.len());
             self.lines.push(line);
         }
         Ok(())
-    }
-
-    /// Adds a statement to the text for `tobj`.
-    fn add<'a>(&mut self, keyword: u8, words: impl Iterator<Item = &'a [u8]>) {
-        self.text.push(keyword);
-        for word in words {
-            self.text.push(b' ');
-            self.text.extend_from_slice(word);
-        }
-        self.text.push(b'\n');
     }
 
     fn check(&self, vertex: usize) -> Result<(), Fault> {

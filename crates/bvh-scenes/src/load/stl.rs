@@ -4,10 +4,9 @@
 //! solids, mistakes `solid` without a name for a binary file, names no line, and knows neither of
 //! the ways in which programs write comments, colours, `end loop` and counts.
 
-use super::mesh::{AFTER_END, Fault, Mesh, Rounding, counted};
+use super::mesh::{AFTER_END, Fault, FromFile, Mesh, Rounding, counted};
 use super::{text, without_mark};
-use bvh_core::Triangle;
-use glam::Vec3;
+use glam::DVec3;
 
 /// The number of bytes before the triangles of a binary file: a comment of 80 bytes, and the number
 /// of triangles.
@@ -44,7 +43,7 @@ fn is_comment(line: &[u8]) -> bool {
 }
 
 /// Reads the bytes of an STL file. O(bytes).
-pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
+pub fn parse<T: FromFile>(bytes: &[u8]) -> Result<Mesh<T>, Fault> {
     let text = without_mark(bytes);
     let is_text = !is_binary(bytes) && is_text(text);
     let (triangles, remarks) = match is_text {
@@ -59,7 +58,7 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
 
 /// Reads the triangles of a binary file, and returns a remark if the header does not give their
 /// number or bytes follow them.
-fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
+fn parse_binary<T: FromFile>(bytes: &[u8]) -> Result<(Vec<T>, Option<String>), Fault> {
     let promised = promised(bytes).ok_or_else(|| {
         let message =
             format!("{} bytes; expected the {HEADER} of a binary STL file's header", bytes.len());
@@ -90,7 +89,8 @@ fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> 
             let message = format!("coordinate {found}; expected a finite number");
             return Err(Fault::of(&format!("facet {number}, counted from 0"), message));
         }
-        triangles.push(Triangle::from(corners));
+        let corner = |i: usize| DVec3::from_array([i, i + 1, i + 2].map(|i| corners[i].into()));
+        triangles.push(T::of([corner(0), corner(3), corner(6)]));
     }
     let ignored = counted(AFTER_END, rest.len());
     let unwritten = (is_unwritten && facets > 0)
@@ -115,10 +115,10 @@ const KEYWORDS: [&str; 9] =
 
 /// Reads the corners of every loop, three at a time, and returns a remark on their rounding.
 /// Normals, colours and names are ignored.
-fn parse_text(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
-    let mut rounding = Rounding::default();
+fn parse_text<T: FromFile>(bytes: &[u8]) -> Result<(Vec<T>, Option<String>), Fault> {
+    let mut rounding = Rounding::<T>::default();
     let mut triangles = Vec::new();
-    let mut corners: Vec<Vec3> = Vec::new();
+    let mut corners: Vec<DVec3> = Vec::new();
     let mut rest = bytes;
     let mut line = 0;
     let mut inside = false;
@@ -148,7 +148,7 @@ fn parse_text(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
                 ("endloop" | "endfacet", _) | ("end", "loop" | "facet") => {
                     match *corners {
                         [] => {}
-                        [a, b, c] => triangles.push(Triangle([a, b, c])),
+                        [a, b, c] => triangles.push(T::of([a, b, c])),
                         _ => {
                             let count = corners.len();
                             return Err(fault(format!(
@@ -183,9 +183,9 @@ fn parse_text(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
     Ok((triangles, remark))
 }
 
-fn corner(words: &[&str], rounding: &mut Rounding) -> Option<Vec3> {
+fn corner<T: FromFile>(words: &[&str], rounding: &mut Rounding<T>) -> Option<DVec3> {
     let &[x, y, z] = words else { return None };
     let mut number = |word: &str| text::number(word.as_bytes(), rounding);
-    let corner = Vec3::new(number(x)?, number(y)?, number(z)?);
+    let corner = DVec3::new(number(x)?, number(y)?, number(z)?);
     corner.is_finite().then_some(corner)
 }
