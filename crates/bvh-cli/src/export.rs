@@ -2,8 +2,7 @@
 
 use crate::Error;
 use crate::answer::{Answer, gain, whole};
-use crate::arguments::{load_scene, output_file};
-use bvh_build::{Builder, muller_fellner};
+use crate::arguments::{greedy, output_file, scene_of};
 use bvh_core::cost::Objective;
 use bvh_core::export::{Layout, Target};
 use bvh_scenes::{files, tree_file};
@@ -45,7 +44,9 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     let target = args.tracer;
     let extension = if target.layout == Layout::Json { "json" } else { "bin" };
     output_file("--out", &args.out, extension)?;
-    let scene = load_scene(&args.scene)?;
+    let scene = scene_of(&args.file, &args.scene)?;
+    // Only triangles in f32 can be traced there.
+    let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
     let (tree, header) = tree_file::load(&args.file, &scene)?;
     if tree.frame.is_some() {
         return Err(Error::Usage(format!(
@@ -64,11 +65,7 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
             args.scene
         )));
     }
-    // Only triangles can be traced there.
-    let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
-    // The loaded tree is over the same boxes, so that these can be built over, too.
-    let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap_or_default();
-    let better = target.fit_better(&tree, &greedy, triangles);
+    let better = target.fit_better(&tree, &greedy(&scene)?, triangles);
     files::write(&args.out, &target.bytes(&better.tree, &scene.boxes))?;
     let which = match better.is_searched() {
         true => "this tree",

@@ -236,6 +236,11 @@ impl Scene {
         }
     }
 
+    /// Returns whether the objects are triangles, in f32 or f64.
+    pub fn has_triangles(&self) -> bool {
+        !matches!(self.primitives, Primitives::Spheres(_))
+    }
+
     /// Returns the direction that is up: z in the stand-ins, and y otherwise, which most modellers
     /// use.
     pub fn up(&self) -> DVec3 {

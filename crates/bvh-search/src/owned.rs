@@ -95,13 +95,8 @@ impl OwnedTree {
         };
         let budget = if is_open { Budget::of_objects(count) } else { options.budget };
         let choice = match &objects {
-            Objects::Shapes(Primitives::Triangles(triangles)) if frame == Frames::Auto => {
-                Some(Choice::of(triangles, budget, observer))
-            }
-            Objects::Shapes(Primitives::Doubles(triangles)) => {
-                Some(Choice::of_doubles(triangles, frame, budget, observer))
-            }
-            _ => None,
+            Objects::Boxes(_) => None,
+            Objects::Shapes(shapes) => Choice::of_shapes(shapes, frame, budget, observer),
         };
         let mut owned = Self::bare(objects, choice.and_then(|choice| choice.frame));
         (owned.references, owned.seed) = (references.unwrap_or(1.0), seed);
