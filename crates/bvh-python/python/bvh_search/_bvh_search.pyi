@@ -213,8 +213,7 @@ class Tracer:
     count as 0 below 2^-150. In other tracers, rays and points are
     rounded to `float32`, and `t_min` and `t_max` inwards.
 
-    `nearest` and `any` choose which triangles count, in trees with `precision="double"`: those with
-    the `orientation` `"exiting"`, which the ray meets along their normal as where it leaves a solid,
+    `nearest` and `any` choose which triangles count: those with the `orientation` `"exiting"`, which the ray meets along their normal as where it leaves a solid,
     `"entering"`, against it, or `"any"`, and none of the indices `exclude`. That is one index,
     an array `(m,)` or `(m, k)` of some for each ray; -1 excludes nothing.
 
