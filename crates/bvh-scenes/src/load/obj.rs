@@ -1,9 +1,11 @@
 //! Reads the triangles of a Wavefront OBJ file, or reports the first invalid line.
 //!
-//! This module does not use `tobj` 4.0.5, because that crate reads a polyline `l 1 2 3` as a
-//! triangle, skips the first vertex after a byte order mark, makes fans of polygons, has numbers of
-//! one precision, and rejects Latin-1 comments, comments at the end of a line, continued lines, and
-//! files in which only some vertices have a colour. Its errors name no line.
+//! `tobj` parses the numbers in f64 and resolves relative indices. It receives only the `v` and `f`
+//! statements that `Geometry` finds, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle,
+//! skips the first vertex after a byte order mark, and rejects Latin-1 comments, comments at the end
+//! of a line, continued lines, and files in which only some vertices have a colour. Its errors name
+//! no line. `Geometry` therefore checks every number before `tobj` receives it. `tobj` would make
+//! fans of polygons, so that `Polygons` splits them instead.
 //!
 //! Points, lines, curves, names, groups, materials (whose files are never opened), normals and
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
@@ -13,26 +15,42 @@ use super::mesh::{Fault, FromFile, Mesh, Rounding, counted};
 use super::polygon::{MOST_CORNERS, Polygons};
 use super::text::{self, number, shown};
 use glam::{DMat3, DVec3};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Reads the bytes of an OBJ file. Any bytes give a mesh or an error. O(bytes), and more for faces
 /// that are not convex.
 pub fn parse<T: FromFile>(bytes: &[u8]) -> Result<Mesh<T>, Fault> {
     let geometry = Geometry::<T>::of(bytes)?;
-    let mut polygons = Polygons::new(&geometry.vertices);
-    let starts = [0].iter().chain(&geometry.ends);
-    for ((&start, &end), &line) in starts.zip(&geometry.ends).zip(&geometry.lines) {
-        polygons
-            .add(&geometry.corners[start..end])
-            .map_err(|message| Fault::in_line(line, format!("face: {message}")))?;
+    let options =
+        tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
+    // No statement names a material, so that `tobj` asks for no material file.
+    let no_material = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let loaded = tobj::load_obj_buf(&mut &geometry.text[..], &options, no_material);
+    let (models, _) = loaded
+        .map_err(|error| Fault::of_file(format!("{error}; expected a Wavefront OBJ file")))?;
+    // Nothing divides the statements, so that there is one model at most.
+    let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
+    // `tobj` keeps exactly the vertices that faces use, and names no lengths of faces if all are
+    // triangles.
+    let positions = mesh.positions.as_chunks().0.iter();
+    let vertices: Vec<DVec3> = positions.map(|&p| DVec3::from(p).map(T::round)).collect();
+    let mut polygons = Polygons::new(&vertices);
+    let mut indices = &mesh.indices[..];
+    let mut arities = mesh.face_arities.iter();
+    for &line in &geometry.lines {
+        let (face, rest) = indices.split_at(arities.next().map_or(3, |&arity| arity as usize));
+        polygons.add(face).map_err(|message| Fault::in_line(line, format!("face: {message}")))?;
+        indices = rest;
     }
     if polygons.triangles.is_empty() {
-        let found = format!("{} vertices and no face of three or more", geometry.vertices.len());
+        let found = format!("{} vertices and no face of three or more", geometry.vertices);
         let message = format!("{found}; expected a Wavefront OBJ file with at least one such face");
         return Err(Fault::of_file(message));
     }
     polygons.short += geometry.short_faces;
-    let mut remarks = polygons.remarks(geometry.vertices.len());
+    let mut remarks = polygons.remarks(geometry.vertices);
     remarks.extend(geometry.unknown);
     remarks.extend(geometry.rounding.remark(&polygons.triangles));
     Ok(Mesh::new(polygons.triangles, remarks))
@@ -71,14 +89,12 @@ pub fn turned(bytes: &[u8], rotation: &DMat3) -> Result<Vec<u8>, Fault> {
 
 /// The checked statements of a file.
 struct Geometry<T> {
-    /// The position of each `v` statement, divided by its weight.
-    vertices: Vec<DVec3>,
-    /// The vertices of all faces, counted from 0, one face after the other.
-    corners: Vec<i64>,
-    /// The end of each face in `corners`.
-    ends: Vec<usize>,
-    /// The line of each face.
+    /// The statements for `tobj`.
+    text: Vec<u8>,
+    /// The line of each face in `text`.
     lines: Vec<usize>,
+    /// The number of `v` statements.
+    vertices: usize,
     /// The number of `f` statements with fewer than three vertices, which are skipped.
     short_faces: usize,
     /// The clause about lines that begin with no keyword.
@@ -99,10 +115,9 @@ impl<T: FromFile> Geometry<T> {
     /// is found only at the end of the file, and is reported last.
     fn of(bytes: &[u8]) -> Result<Self, Fault> {
         let mut geometry = Self {
-            vertices: Vec::new(),
-            corners: Vec::new(),
-            ends: Vec::new(),
+            text: Vec::new(),
             lines: Vec::new(),
+            vertices: 0,
             short_faces: 0,
             unknown: None,
             invalid: BTreeMap::new(),
@@ -118,8 +133,8 @@ impl<T: FromFile> Geometry<T> {
             }
         }
         for &(vertex, line) in &geometry.ahead {
-            let most = geometry.vertices.len();
-            if vertex > most {
+            if vertex > geometry.vertices {
+                let most = geometry.vertices;
                 let expected = format!("expected at most {most}, the file's vertex count");
                 return Err(Fault::in_line(line, format!("face vertex {vertex}; {expected}")));
             }
@@ -134,6 +149,7 @@ impl<T: FromFile> Geometry<T> {
 
     /// Adds a vertex without its colour: its coordinates, and its weight if it has one.
     fn add_vertex(&mut self, words: &[&[u8]], line: usize) -> Result<(), Fault> {
+        self.vertices += 1;
         let length = words.len();
         if !matches!(length, 3 | 4 | 6..=8) {
             let expected = "3 (x y z), 4 (x y z and a weight), or 3 or 4 more (a colour)";
@@ -157,14 +173,21 @@ impl<T: FromFile> Geometry<T> {
         for (place, word) in words.iter().enumerate() {
             numbers[place] = number(word, &mut self.rounding).ok_or_else(|| fault(place))?;
         }
-        let [x, y, z, weight] = numbers;
-        let position = DVec3::new(x, y, z).map(|x| T::round(x / weight));
-        // A number that is divided by ∞ is finite.
+        // `tobj` divides by the weight, and x / ∞ is finite.
+        let [position @ .., weight] = numbers;
+        let is_divisible = position.iter().all(|x| T::round(x / weight).is_finite());
         let infinite = numbers.iter().position(|number| !number.is_finite());
-        self.vertices.push(position);
-        if let Some(place) = infinite.or((!position.is_finite()).then_some(3)) {
-            // Some programs write vertices that they do not use in this way.
-            self.invalid.insert(self.vertices.len(), fault(place));
+        match infinite.or((!is_divisible).then_some(3)) {
+            None => {
+                let is_divided = words.len() == 4;
+                let numbers = words.iter().zip(numbers);
+                self.add(b'v', numbers.map(|(word, x)| digits::<T>(word, x, is_divided)));
+            }
+            Some(place) => {
+                // Some programs write vertices that they do not use in this way.
+                self.invalid.insert(self.vertices, fault(place));
+                self.text.extend(b"v 0 0 0\n");
+            }
         }
         Ok(())
     }
@@ -175,8 +198,7 @@ impl<T: FromFile> Geometry<T> {
                 format!("face of more than {MOST_CORNERS} vertices; expected at most as many");
             return Err(Fault::in_line(line, message));
         }
-        let vertices = self.vertices.len();
-        let start = self.corners.len();
+        let vertices = self.vertices;
         for corner in words {
             let index: isize = std::str::from_utf8(vertex_index(corner))
                 .ok()
@@ -198,21 +220,38 @@ impl<T: FromFile> Geometry<T> {
                 self.ahead.push((vertex, line));
             }
             self.check(vertex)?;
-            self.corners.push(vertex as i64 - 1);
         }
         if words.len() < 3 {
             self.short_faces += 1;
-            self.corners.truncate(start);
         } else {
-            self.ends.push(self.corners.len());
+            self.add(b'f', words.iter().map(|word| vertex_index(word).into()));
             self.lines.push(line);
         }
         Ok(())
     }
 
+    /// Adds a statement to the text for `tobj`.
+    fn add<'a>(&mut self, keyword: u8, words: impl Iterator<Item = Cow<'a, [u8]>>) {
+        self.text.push(keyword);
+        for word in words {
+            self.text.push(b' ');
+            self.text.extend_from_slice(&word);
+        }
+        self.text.push(b'\n');
+    }
+
     fn check(&self, vertex: usize) -> Result<(), Fault> {
         self.invalid.get(&vertex).map_or(Ok(()), |fault| Err(fault.clone()))
     }
+}
+
+/// Returns the digits for `tobj` of a coordinate or weight `number` that `word` spells: the word
+/// itself if [`FromFile::round`] of what `tobj` makes of it is what it must be. It is not if rounding
+/// to f64 first changes the number, or if a vertex is divided before it is rounded.
+fn digits<T: FromFile>(word: &[u8], number: f64, is_divided: bool) -> Cow<'_, [u8]> {
+    let in_f64: Option<f64> = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
+    let kept = if is_divided { in_f64 } else { in_f64.map(T::round) };
+    if kept == Some(number) { word.into() } else { format!("{number:e}").into_bytes().into() }
 }
 
 /// Returns the `7` of `7`, `7/1`, `7//3` and `7/1/3`.
@@ -305,6 +344,29 @@ fn is_ignored(word: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bvh_core::{DTriangle, Triangle};
+
+    #[test]
+    fn a_number_in_f32_is_rounded_once_and_divided_afterwards() {
+        let mut differ = [0; 2];
+        for k in 0..1000 {
+            let below = f32::from_bits(1.0f32.to_bits() + 7919 * k);
+            // A little more than half the way to the next number, which f64 cannot tell from half.
+            let half = f64::from(below) + 2f64.powi(-24);
+            let (word, divisor) = (format!("{half:.60}1"), (0.37 * f64::from(k + 1)).to_string());
+            let (exact, weight): (f64, f64) = (word.parse().unwrap(), divisor.parse().unwrap());
+            let file = format!("v {word} 0 0\nv 0 1 0\nv {word} 0 1 {divisor}\nf 1 2 3");
+            let x = |file: &str| parse::<Triangle>(file.as_bytes()).unwrap().triangles[0].0;
+            let [whole, _, divided] = x(&file).map(|corner| corner.x);
+            assert_eq!(whole.to_bits(), below.next_up().to_bits(), "{word}");
+            assert_eq!(divided.to_bits(), (whole / weight as f32).to_bits(), "{word} {divisor}");
+            let in_f64 = parse::<DTriangle>(file.as_bytes()).unwrap().triangles[0].0;
+            assert_eq!(in_f64.map(|corner| corner.x), [exact, 0.0, exact / weight]);
+            differ[0] += u32::from(exact as f32 != whole);
+            differ[1] += u32::from((exact / weight) as f32 != divided);
+        }
+        assert!(differ.iter().all(|&count| count > 100), "{differ:?}");
+    }
 
     #[test]
     fn an_endless_statement_needs_memory_for_a_limited_number_of_words() {
