@@ -14,7 +14,7 @@ use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Rounding, counted};
 use accessors::{F32, I8, I16, U8, U16, U32};
 use buffers::Buffers;
 use bvh_core::Triangle;
-use document::{Document, Primitive, document, is_covered};
+use document::{DECOMPRESS, Document, Primitive, document, is_covered};
 use glam::{DMat4, DVec3, Vec3};
 use nodes::places;
 pub(super) use orient::orient;
@@ -173,12 +173,17 @@ impl Loader<'_> {
     }
 
     fn add(&mut self, primitive: &Primitive, triangles: &mut Vec<Triangle>) -> Result<(), String> {
-        let mode = primitive.mode;
+        let mode = primitive.mode.unwrap_or(4);
         if mode > 6 {
             return Err(format!("mode {mode}; expected 0 to 6"));
         }
         let points = match primitive.attributes.get("POSITION").filter(|_| mode >= 4) {
-            Some(&accessor) => self.buffers.accessor::<3>(accessor, &POSITIONS)?,
+            Some(&accessor) => {
+                self.buffers.accessor::<3>(accessor, &POSITIONS).map_err(|message| {
+                    let is_draco = primitive.extensions.contains_key("KHR_draco_mesh_compression");
+                    if is_draco { format!("{message}{DECOMPRESS}") } else { message }
+                })?
+            }
             None => Vec::new(),
         };
         if points.is_empty() {
