@@ -25,7 +25,7 @@ pub struct ExportArgs {
     #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
     pub tracer: Target,
     /// The file to write, replaced when it is complete; `.json` for json.
-    #[arg(long, value_name = "FILE.bin|.json")]
+    #[arg(short, long, value_name = "FILE.bin|.json")]
     pub out: PathBuf,
     /// Accept a tree that divides triangles among leaves also for a tracer whose queries for all
     /// hits would find them more than once, because yours are for the nearest or any hit.
