@@ -22,7 +22,7 @@ pub struct RenderArgs {
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// The picture, a PNG file.
-    #[arg(long, value_name = "FILE.png")]
+    #[arg(short, long, value_name = "FILE.png")]
     pub out: PathBuf,
     /// The acceleration structure: brute, kdtree, bvh, wide, or a saved tree. It changes only the
     /// time.

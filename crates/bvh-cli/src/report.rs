@@ -31,7 +31,7 @@ pub struct ReportArgs {
     pub scene: String,
     /// The page, an HTML file without scripts that refers to no other file. The default is the name
     /// of the tree file with the extension html, which must be free.
-    #[arg(long, value_name = "FILE.html")]
+    #[arg(short, long, value_name = "FILE.html")]
     pub out: Option<PathBuf>,
 }
 

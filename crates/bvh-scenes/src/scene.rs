@@ -1,6 +1,7 @@
 //! A loaded scene, and the names that select one.
 
 use crate::builtin::{spheres, stand_ins, stiff};
+use crate::files::did_you_mean;
 use crate::fnv1a;
 use crate::load::mesh::FromFile;
 use crate::load::{self, MeshError};
@@ -158,7 +159,7 @@ impl Scene {
         // A single word without an extension was meant as a scene's name, so that the error lists
         // the names. Anything else is a path, and the reader reports its fault.
         if path.extension().is_none() && path.components().count() == 1 && !path.exists() {
-            let meant = did_you_mean(name);
+            let meant = did_you_mean(name, known_names().map(Into::into));
             return Err(SceneError::new(name, format!("no such scene{meant}; {}", known_scenes())));
         }
         let read = match precision {
@@ -272,17 +273,6 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
 fn known_names() -> impl Iterator<Item = &'static str> {
     let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
     names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name))
-}
-
-/// Returns the question after the nearest of the known names, as `; did you mean escher?`, or
-/// nothing if none is near.
-fn did_you_mean(name: &str) -> String {
-    const NEAR: f64 = 0.6;
-    let near = |known| (strsim::normalized_damerau_levenshtein(name, known), known);
-    match known_names().map(near).max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((nearness, known)) if nearness >= NEAR => format!("; did you mean {known}?"),
-        _ => String::new(),
-    }
 }
 
 fn known_scenes() -> String {

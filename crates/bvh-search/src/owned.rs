@@ -7,7 +7,7 @@ use crate::{
 };
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
-use bvh_core::export::Target;
+use bvh_core::export::{ExportError, Target};
 use bvh_core::file::{FileError, TreeFile};
 use bvh_core::{
     Aabb, Bvh, DTriangle, Frame, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle,
@@ -52,14 +52,6 @@ impl Default for Options<'_> {
         Self { references: None, seed: 1, budget, rays: &[], anywhere: None, frame }
     }
 }
-
-/// The reason why a tree is not exported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the boxes of the tree lie in a frame, but those of other tracers along the file's axes; \
-     accepted: a tree of a bake with the file's frame"
-)]
-pub struct FramedExport;
 
 /// The tree of a [`Bake`], with its objects.
 #[derive(Clone, Debug)]
@@ -208,11 +200,10 @@ impl OwnedTree {
     }
 
     /// Returns the tree as a [file](Target::bytes) for another tracer; of triangles, the greedy tree
-    /// if it is [better](Target::fit_better) there. Rejects a tree in a frame.
-    pub fn export(&self, target: &Target) -> Result<Vec<u8>, FramedExport> {
-        if self.tree.frame.is_some() {
-            return Err(FramedExport);
-        }
+    /// if it is [better](Target::fit_better) there. Rejects trees that the tracer would trace
+    /// [wrongly](Target::check); `divided` says that all queries are for the nearest or any hit.
+    pub fn export(&self, target: &Target, divided: bool) -> Result<Vec<u8>, ExportError> {
+        target.check(&self.tree, self.boxes.len(), divided)?;
         let fitted = match (self.triangles(), muller_fellner::Config::default().build(&self.boxes))
         {
             (Some(triangles), Ok(greedy)) => target.fit_better(&self.tree, &greedy, triangles).tree,

@@ -29,6 +29,11 @@ use watch::Watch;
 
 /// Search for the best tree of a scene within a budget, and save it.
 #[derive(Args, Clone, Debug)]
+#[command(after_help = "Examples:
+  bvh bake scene.glb                    choose everything, and end when more hardly pays
+  bvh bake scene.glb --budget 1m        search for a minute
+  bvh bake scene.glb --rays frame.npy   for the rays of a frame
+  bvh bake scene.glb --for obvhs        for `bvh export scene.bvh scene.glb --for obvhs`")]
 pub struct BakeArgs {
     /// Name of a scene, or path of a mesh file.
     pub scene: String,
@@ -40,7 +45,7 @@ pub struct BakeArgs {
     pub budget: Option<Effort>,
     /// The file to write. It replaces an existing file when it is complete. Without it, a new file
     /// with the scene's name, in this folder.
-    #[arg(long, value_name = "FILE.bvh")]
+    #[arg(short, long, value_name = "FILE.bvh")]
     pub out: Option<PathBuf>,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]

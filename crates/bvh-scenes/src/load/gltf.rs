@@ -13,7 +13,7 @@ mod orient;
 use super::mesh::{Fault, FromFile, MOST_TRIANGLES, Mesh, Rounding, counted};
 use accessors::{F32, I8, I16, U8, U16, U32};
 use buffers::Buffers;
-use document::{Document, Primitive, document, is_covered};
+use document::{DECOMPRESS, Document, Primitive, document, is_covered};
 use glam::{DMat4, DVec3};
 use nodes::places;
 pub(super) use orient::orient;
@@ -179,12 +179,17 @@ impl Loader<'_> {
         primitive: &Primitive,
         triangles: &mut Vec<T>,
     ) -> Result<(), String> {
-        let mode = primitive.mode;
+        let mode = primitive.mode.unwrap_or(4);
         if mode > 6 {
             return Err(format!("mode {mode}; expected 0 to 6"));
         }
         let points = match primitive.attributes.get("POSITION").filter(|_| mode >= 4) {
-            Some(&accessor) => self.buffers.accessor::<3>(accessor, &POSITIONS)?,
+            Some(&accessor) => {
+                self.buffers.accessor::<3>(accessor, &POSITIONS).map_err(|message| {
+                    let is_draco = primitive.extensions.contains_key("KHR_draco_mesh_compression");
+                    if is_draco { format!("{message}{DECOMPRESS}") } else { message }
+                })?
+            }
             None => Vec::new(),
         };
         if points.is_empty() {

@@ -5,6 +5,7 @@ mod gltf;
 pub mod mesh;
 mod obj;
 mod orient;
+mod other;
 mod ply;
 mod polygon;
 mod stl;
@@ -61,7 +62,8 @@ impl Format {
         if bytes.starts_with(b"glTF") || text.starts_with(b"{") {
             return Self::Gltf;
         }
-        if let [b'p', b'l', b'y', after, ..] = unmarked
+        if let [word @ .., after] = &unmarked[..unmarked.len().min(4)]
+            && word.eq_ignore_ascii_case(b"ply")
             && after.is_ascii_whitespace()
         {
             return Self::Ply;
@@ -110,6 +112,10 @@ fn parse_as<T: FromFile>(bytes: &[u8], path: &Path) -> Result<Mesh<T>, MeshError
         }
         _ if is_utf_16 && !stl::is_binary(bytes) => {
             Err(Fault::of_file("the text is UTF-16; expected UTF-8 or ASCII"))
+        }
+        _ if other::kind(bytes).is_some() && !stl::is_binary(bytes) => {
+            let found = other::kind(bytes).unwrap_or_default();
+            Err(Fault::of_file(format!("{found}; expected an OBJ, PLY, STL or glTF file")))
         }
         Format::Obj => obj::parse(bytes),
         Format::Ply => ply::parse(bytes),

@@ -148,7 +148,7 @@ impl<'a, T: FromFile> File<'a, T> {
             let lossy = String::from_utf8_lossy(line);
             let words: Vec<&str> = lossy.split_ascii_whitespace().collect();
             match words[..] {
-                ["ply"] if self.line == 1 => {}
+                [word] if self.line == 1 && word.eq_ignore_ascii_case("ply") => {}
                 _ if self.line == 1 => {
                     return Err(format!("`{}`; expected ply", text::shown(line)));
                 }
@@ -296,15 +296,16 @@ const ENDS: &str = "the file ends here; expected the elements of the header";
 
 impl Element {
     fn add(&mut self, types: &[&str], name: &str) -> Result<(), String> {
-        if self.properties.iter().any(|property| property.name == name) {
-            return Err(format!("property `{name}` repeats a name; expected each once"));
-        }
         let axis = ["x", "y", "z"].iter().position(|axis| *axis == name);
         let purpose = match (self.name.as_str(), axis) {
             ("vertex", Some(axis)) => Purpose::Axis(axis),
             ("face", _) if matches!(name, "vertex_indices" | "vertex_index") => Purpose::Indices,
             _ => Purpose::Ignored,
         };
+        let is_repeated = self.properties.iter().any(|property| property.name == name);
+        if is_repeated && purpose != Purpose::Ignored {
+            return Err(format!("property `{name}` repeats a name; expected each once"));
+        }
         let (length, scalar) = match *types {
             [scalar] => (None, Scalar::named(scalar)?),
             ["list", length, scalar] => (Some(Scalar::named(length)?), Scalar::named(scalar)?),

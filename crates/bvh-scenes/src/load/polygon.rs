@@ -136,6 +136,8 @@ impl<'a, T: FromFile> Polygons<'a, T> {
             self.triangles.extend(fan.map(at));
             return Ok(());
         }
+        // What an edge encloses that runs out and back, or a corner that repeats another, has no area.
+        ears.resize(last as usize - 1, [0; 3]);
         // One order, and the polygon's orientation, whatever ear was cut first.
         ears.iter_mut().for_each(|ear| ear.sort_unstable());
         ears.sort_unstable();

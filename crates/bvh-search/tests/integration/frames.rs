@@ -162,9 +162,9 @@ fn a_tree_in_a_frame_keeps_it_and_the_answers_of_rays() {
             assert_eq!(hits(&found), hits(&plain));
             assert!(hits(&found).iter().flatten().count() > 50);
         }
-        let error = owned.export(&Target::ALL[0]).unwrap_err();
+        let error = owned.export(&Target::ALL[0], false).unwrap_err();
         assert!(error.to_string().contains("the file's frame"), "{error}");
-        assert!(plain.export(&Target::ALL[0]).is_ok());
+        assert!(plain.export(&Target::ALL[0], true).is_ok());
     }
 }
 

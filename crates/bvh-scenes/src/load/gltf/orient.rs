@@ -200,7 +200,7 @@ impl File<'_> {
         let node = &mut self.json["nodes"][number];
         let mut names = node.as_object().into_iter().flatten().map(|(name, _)| name.as_str());
         if is_still && is_uniform && names.all(|name| OWN.contains(&name)) {
-            let turn = old.rotation.map(|turn| DQuat::from_array(turn).normalize());
+            let turn = old.rotation().map(|turn| DQuat::from_array(turn).normalize());
             let turn = turn.map_or(back, |turn| turn * back.normalize());
             node["rotation"] = json!(turn.to_array());
             return;
