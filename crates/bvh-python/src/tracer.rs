@@ -4,7 +4,7 @@
 use crate::answers::{Call, Column, Hint, Reals, Rows};
 use crate::arrays::numbers;
 use crate::elements::invalid;
-use crate::precision::{Precision, Real};
+use crate::precision::Real;
 use crate::rays::{RayArrays, Selection, points};
 use crate::threads::detached;
 use crate::tree::Tree;
