@@ -47,8 +47,9 @@ int main(int argc, char** argv) {
     Header header{};
     if (bytes.size() >= sizeof header) std::memcpy(&header, bytes.data(), sizeof header);
     const bool visits = header.flags & 1;
+    const size_t frame = header.flags & 2 ? 96 : 0;
     if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version != 4 || header.endianness != 0x01020304 ||
-        bytes.size() != sizeof header + (visits ? 36 : 32) * header.nodes + 4 * header.references) {
+        bytes.size() != sizeof header + (visits ? 36 : 32) * header.nodes + 4 * header.references + frame) {
         return std::fprintf(stderr, "not a tree file of version 4, or cut\n"), 1;
     }
     const uint32_t body = crc32(bytes.data() + sizeof header, bytes.size() - sizeof header);

@@ -10,8 +10,9 @@ if len(data) < 192 or data[:8] != b"\x89BVH\r\n\x1a\n" or struct.unpack_from("<2
     sys.exit("not a tree file of version 4")
 objective, scene, count, objects, seed, work, cost = struct.unpack_from("<2I4Qd", data, 16)
 references, flags = struct.unpack_from("<QI", data, 168)
-visits = count if flags else 0
-if len(data) != 192 + 32 * count + 4 * references + 4 * visits:
+visits = count if flags & 1 else 0
+frame = 96 if flags & 2 else 0
+if len(data) != 192 + 32 * count + 4 * references + 4 * visits + frame:
     sys.exit("cut or extended")
 if zlib.crc32(data[:188], zlib.crc32(data[192:])) != struct.unpack_from("<I", data, 188)[0]:
     sys.exit("damaged")

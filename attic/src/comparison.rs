@@ -2,7 +2,7 @@
 //! over the scenes.
 
 use crate::rows::{PeerRayRow, RayRatioRow};
-use crate::tracing::layout::{COMPILED, is_repeat, is_single};
+use crate::tracing::layout::{COMPILED, is_double, is_repeat, is_single};
 use crate::tracing::speed::Traced;
 use harness::processor::PROCESSOR;
 use harness::statistics::{self, geometric_mean, range};
@@ -122,10 +122,11 @@ pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
 type IsRival = fn(&PeerRayRow) -> bool;
 
 /// The modes of other libraries that ours are compared with.
-const AGAINST: [(&str, IsRival); 4] = [
+const AGAINST: [(&str, IsRival); 5] = [
     ("any mode", |_| true),
     ("single calls", |row| is_single(&row.mode)),
     ("whole triangles", |row| !row.mode.contains("splits") && !is_split_by_embree(row)),
+    ("embree in double", |row| row.library == "embree" && is_double(&row.mode)),
     ("robust", |row| row.library == "embree" && row.mode.contains("robust")),
 ];
 
@@ -194,6 +195,7 @@ fn over_fastest(
         .iter()
         .filter(|rival| rival.row.library != OURS && is_rival(&rival.row))
         .filter(|rival| rival.row.scene == own.row.scene && rival.row.rays == own.row.rays)
+        .filter(|rival| is_double(&rival.row.mode) == is_double(&own.row.mode))
         .filter(|rival| accepted_instructions.contains(&rival.row.instructions.as_str()))
         .max_by(|a, b| a.row.million_per_s.total_cmp(&b.row.million_per_s))?;
     let turns: Vec<f64> =

@@ -43,8 +43,8 @@ pub struct RayRatioRow {
     pub processor: String,
     /// Our mode.
     pub mode: String,
-    /// The modes compared with: `any mode`, `single calls`, those of `whole triangles`, or
-    /// Embree's `robust` ones.
+    /// The modes compared with: `any mode` of the same precision, `single calls`, those of `whole
+    /// triangles`, or Embree's in `double` or `robust` ones.
     pub against: String,
     /// The fastest of them on this scene; empty for means.
     pub fastest: String,

@@ -2,6 +2,9 @@
 // out through standard output. `ray_peers "LIBRARY MODE"` traces by one mode. `ray_peers` alone lists all modes, a line
 // each: instruction set, library, version and mode, between tabs.
 //
+// Compiled with -DDOUBLE, it traces in f64 instead: the same mesh and rays, whose numbers are exact in f64, with Embree's
+// user geometry, tinybvh, and madmann91/bvh if its folder is given. Distances are rounded when the time is over.
+//
 // Everything is in the machine's byte order (little-endian on every supported one):
 //
 //   in:   u32 triangles, then 9 f32 for each
@@ -15,6 +18,15 @@
 
 #define TINYBVH_IMPLEMENTATION
 #include "tiny_bvh.h"
+
+#if defined(DOUBLE) && __has_include(<bvh/v2/bvh.h>)
+#define MADMANN
+#include <bvh/v2/bvh.h>
+#include <bvh/v2/default_builder.h>
+#include <bvh/v2/node.h>
+#include <bvh/v2/stack.h>
+#include <bvh/v2/tri.h>
+#endif
 
 #include <algorithm>
 #include <chrono>
@@ -109,6 +121,29 @@ void rtcIntersect8(const int *valid, RTCSceneTy *scene, RayHits<8> *rays, Argume
 void rtcOccluded8(const int *valid, RTCSceneTy *scene, Rays<8> *rays, Arguments *arguments);
 void rtcIntersect16(const int *valid, RTCSceneTy *scene, RayHits<16> *rays, Arguments *arguments);
 void rtcOccluded16(const int *valid, RTCSceneTy *scene, Rays<16> *rays, Arguments *arguments);
+
+struct RTCBounds {
+    float lower[3], align0, upper[3], align1;
+};
+struct RTCBoundsArguments {
+    void *data;
+    unsigned primID, timeStep;
+    RTCBounds *bounds;
+};
+/// The arguments of both functions of a user geometry. An occluded ray is the first member of its `RTCRayHit`.
+struct RTCFunctionArguments {
+    int *valid;
+    void *data;
+    unsigned primID;
+    void *context;
+    RTCRayHit *ray;
+    unsigned count, geomID;
+};
+void rtcSetGeometryUserPrimitiveCount(RTCGeometryTy *geometry, unsigned count);
+void rtcSetGeometryUserData(RTCGeometryTy *geometry, void *data);
+void rtcSetGeometryBoundsFunction(RTCGeometryTy *geometry, void (*bounds)(const RTCBoundsArguments *), void *data);
+void rtcSetGeometryIntersectFunction(RTCGeometryTy *geometry, void (*intersect)(const RTCFunctionArguments *));
+void rtcSetGeometryOccludedFunction(RTCGeometryTy *geometry, void (*occluded)(const RTCFunctionArguments *));
 }
 
 #ifdef __AVX512F__
@@ -309,6 +344,219 @@ public:
     }
 };
 
+// --------------------------------------------------------------------------------------------------------- doubles
+
+#ifdef DOUBLE
+using Corners = std::vector<double>;
+
+/// A library in f64, ray by ray. It has a type of rays, which it makes and whose distance it returns, infinite after a
+/// miss, and functions that trace one.
+template <class Library> class InDouble : public Tracer {
+    Library library;
+
+public:
+    InDouble(const std::vector<float> &corners) : library(Corners(corners.begin(), corners.end())) {}
+
+    double trace(const Query &query, const Ray *rays, size_t count, float *distances) override {
+        double seconds = 0;
+        std::vector<typename Library::Ray> block(BLOCK);
+        bool occluded[BLOCK];
+        for (size_t first = 0; first < count; first += BLOCK) {
+            size_t size = std::min(BLOCK, count - first);
+            for (size_t i = 0; i < size; i++) block[i] = Library::ray(rays[first + i]);
+            double start = now();
+            if (query.any)
+                for (size_t i = 0; i < size; i++) occluded[i] = library.occluded(block[i]);
+            else
+                for (size_t i = 0; i < size; i++) library.intersect(block[i]);
+            seconds += now() - start;
+            for (size_t i = 0; i < size; i++)
+                distances[first + i] = !query.any ? float(Library::distance(block[i])) : occluded[i] ? 0 : MISS;
+        }
+        return seconds;
+    }
+};
+
+/// Embree's boxes, and a function in f64 for each triangle, as particle transport calls Embree: robust, of high quality,
+/// with boxes that are wider by a millionth of the scene. The functions exclude no triangle and ask for no side.
+class EmbreeUser {
+    RTCSceneTy *scene;
+    Corners corners;
+    double margin = 0;
+
+public:
+    /// Embree's ray, with what it is in f64. Embree returns it to the functions.
+    struct Ray : RTCRayHit {
+        double origin[3], direction[3], t_min, t;
+    };
+
+    EmbreeUser(Corners all) : corners(std::move(all)) {
+        constexpr int USER = 120, ROBUST = 1 << 2, HIGH_QUALITY = 2;
+        double size = 0;
+        for (double coordinate : corners) size = std::max(size, std::fabs(coordinate));
+        margin = 1e-6 * size;
+        RTCDeviceTy *device = rtcNewDevice(EMBREE_CONFIG);
+        scene = rtcNewScene(device);
+        rtcSetSceneFlags(scene, ROBUST);
+        rtcSetSceneBuildQuality(scene, HIGH_QUALITY);
+        RTCGeometryTy *mesh = rtcNewGeometry(device, USER);
+        rtcSetGeometryUserPrimitiveCount(mesh, unsigned(corners.size() / 9));
+        rtcSetGeometryUserData(mesh, this);
+        rtcSetGeometryBoundsFunction(mesh, bounds, nullptr);
+        rtcSetGeometryIntersectFunction(mesh, intersect_one);
+        rtcSetGeometryOccludedFunction(mesh, occluded_one);
+        rtcCommitGeometry(mesh);
+        rtcAttachGeometry(scene, mesh);
+        rtcCommitScene(scene);
+    }
+    // The geometry points to this.
+    EmbreeUser(const EmbreeUser &) = delete;
+
+    static Ray ray(const ::Ray &from) {
+        Ray ray{};
+        const auto &[o, t_min, d, t_max] = from;
+        ray.ray = {o[0], o[1], o[2], t_min, d[0], d[1], d[2], 0, t_max, ~0u, 0, 0};
+        ray.hit.geomID = ray.hit.instID = ray.hit.instPrimID = ~0u;
+        for (int axis = 0; axis < 3; axis++) ray.origin[axis] = o[axis], ray.direction[axis] = d[axis];
+        ray.t_min = t_min, ray.t = t_max;
+        return ray;
+    }
+    static double distance(const Ray &ray) { return ray.hit.geomID == ~0u ? MISS : ray.t; }
+    void intersect(Ray &ray) { rtcIntersect1(scene, &ray, nullptr); }
+    bool occluded(Ray &ray) {
+        rtcOccluded1(scene, &ray.ray, nullptr);
+        return ray.ray.tfar < 0;
+    }
+
+private:
+    static void bounds(const RTCBoundsArguments *arguments) {
+        auto *self = static_cast<EmbreeUser *>(arguments->data);
+        const double *corner = &self->corners[9 * size_t(arguments->primID)];
+        for (int axis = 0; axis < 3; axis++) {
+            auto [least, most] = std::minmax({corner[axis], corner[3 + axis], corner[6 + axis]});
+            arguments->bounds->lower[axis] = float(least - self->margin);
+            arguments->bounds->upper[axis] = float(most + self->margin);
+        }
+    }
+
+    /// Shortens the ray to a triangle that it hits by the signed volumes over its edges, and returns whether it does.
+    static bool hits(const RTCFunctionArguments *arguments, Ray &ray) {
+        const double *corner = &static_cast<EmbreeUser *>(arguments->data)->corners[9 * size_t(arguments->primID)];
+        const double *d = ray.direction;
+        double a[3], b[3], c[3];
+        for (int axis = 0; axis < 3; axis++) {
+            a[axis] = corner[axis] - ray.origin[axis];
+            b[axis] = corner[3 + axis] - ray.origin[axis];
+            c[axis] = corner[6 + axis] - ray.origin[axis];
+        }
+        auto volume = [](const double *x, const double *y, const double *z) {
+            return x[0] * (y[1] * z[2] - y[2] * z[1]) + x[1] * (y[2] * z[0] - y[0] * z[2]) + x[2] * (y[0] * z[1] - y[1] * z[0]);
+        };
+        double u = volume(d, c, b), v = volume(d, a, c), w = volume(d, b, a), whole = u + v + w;
+        if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0)) return false;
+        if (whole == 0) return false;
+        double t = (u * a[0] + v * b[0] + w * c[0]) * d[0] + (u * a[1] + v * b[1] + w * c[1]) * d[1] +
+                   (u * a[2] + v * b[2] + w * c[2]) * d[2];
+        t /= whole * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        if (!(ray.t_min <= t && t < ray.t)) return false;
+        ray.t = t;
+        return true;
+    }
+    static void intersect_one(const RTCFunctionArguments *arguments) {
+        Ray &ray = static_cast<Ray &>(*arguments->ray);
+        if (!*arguments->valid || !hits(arguments, ray)) return;
+        ray.ray.tfar = float(ray.t);
+        ray.hit.primID = arguments->primID;
+        ray.hit.geomID = arguments->geomID;
+    }
+    static void occluded_one(const RTCFunctionArguments *arguments) {
+        Ray &ray = static_cast<Ray &>(*arguments->ray);
+        if (*arguments->valid && hits(arguments, ray)) ray.ray.tfar = -INFINITY;
+    }
+};
+
+/// tinybvh's binary tree in f64.
+class TinyBvhDouble {
+    std::vector<tinybvh::bvhdbl3> vertices;
+    tinybvh::BVH_Double layout;
+
+public:
+    struct Ray : tinybvh::RayEx {
+        double t_max;
+    };
+
+    TinyBvhDouble(const Corners &corners) {
+        for (size_t i = 0; i < corners.size(); i += 3) vertices.emplace_back(corners[i], corners[i + 1], corners[i + 2]);
+        layout.Build(vertices.data(), vertices.size() / 3);
+    }
+    static Ray ray(const ::Ray &from) {
+        const float *o = from.origin, *d = from.direction;
+        double t_max = std::fmin(from.t_max, BVH_DBL_FAR);
+        return {{{o[0], o[1], o[2]}, {d[0], d[1], d[2]}, t_max}, t_max};
+    }
+    static double distance(const Ray &ray) { return ray.hit.t < ray.t_max ? ray.hit.t : MISS; }
+    void intersect(Ray &ray) const { layout.Intersect(ray); }
+    bool occluded(const Ray &ray) const { return layout.IsOccluded(ray); }
+};
+
+#ifdef MADMANN
+/// The binary tree of madmann91/bvh in f64, of its highest quality, with its precomputed triangles in the tree's order.
+class Madmann {
+    using Vec = bvh::v2::Vec<double, 3>;
+    using Node = bvh::v2::Node<double, 3>;
+    using Tree = bvh::v2::Bvh<Node>;
+    Tree tree;
+    std::vector<bvh::v2::PrecomputedTri<double>> triangles;
+
+public:
+    struct Ray {
+        bvh::v2::Ray<double, 3> ray;
+        bool is_hit;
+    };
+
+    Madmann(const Corners &corners) {
+        std::vector<bvh::v2::BBox<double, 3>> boxes;
+        std::vector<Vec> centers;
+        auto triangle = [&](size_t id) {
+            auto corner = [&](size_t i) { return Vec(corners[i], corners[i + 1], corners[i + 2]); };
+            return bvh::v2::Tri<double, 3>(corner(9 * id), corner(9 * id + 3), corner(9 * id + 6));
+        };
+        for (size_t id = 0; id < corners.size() / 9; id++) {
+            boxes.push_back(triangle(id).get_bbox());
+            centers.push_back(triangle(id).get_center());
+        }
+        tree = bvh::v2::DefaultBuilder<Node>::build(boxes, centers);
+        for (size_t id : tree.prim_ids) triangles.emplace_back(triangle(id));
+    }
+    static Ray ray(const ::Ray &from) {
+        const auto &[o, t_min, d, t_max] = from;
+        return {{Vec(o[0], o[1], o[2]), Vec(d[0], d[1], d[2]), t_min, t_max}, false};
+    }
+    static double distance(const Ray &ray) { return ray.is_hit ? ray.ray.tmax : MISS; }
+    void intersect(Ray &ray) const { trace<false>(ray); }
+    bool occluded(Ray &ray) const {
+        trace<true>(ray);
+        return ray.is_hit;
+    }
+
+private:
+    template <bool ANY> void trace(Ray &ray) const {
+        bvh::v2::SmallStack<Tree::Index, 64> stack;
+        tree.intersect<ANY, false>(ray.ray, tree.get_root().index, stack, [&](size_t begin, size_t end) {
+            bool is_hit = false;
+            for (size_t i = begin; i < end; i++) {
+                if (auto hit = triangles[i].intersect(ray.ray)) {
+                    ray.ray.tmax = std::get<0>(*hit);
+                    is_hit = ray.is_hit = true;
+                }
+            }
+            return is_hit;
+        });
+    }
+};
+#endif
+#endif
+
 // ------------------------------------------------------------------------------------------------------------ modes
 
 struct Mode {
@@ -321,6 +569,13 @@ template <class T, bool... Settings> std::unique_ptr<Tracer> make(const std::vec
 }
 
 constexpr Mode MODES[] = {
+#ifdef DOUBLE
+    {"embree functions in double", make<InDouble<EmbreeUser>>},
+    {"tinybvh BVH in double", make<InDouble<TinyBvhDouble>>},
+#ifdef MADMANN
+    {"madmann91/bvh BVH in double", make<InDouble<Madmann>>},
+#endif
+#else
     {"embree medium", make<Embree, false, false>},
     {"embree high", make<Embree, true, false>},
     {"embree medium robust", make<Embree, false, true>},
@@ -339,6 +594,7 @@ constexpr Mode MODES[] = {
     {"tinybvh BVH8 splits", make<TinyBvh<tinybvh::BVH8_CPU>, true>},
     {"tinybvh packets", make<TinyBvhPackets, false>},
     {"tinybvh packets splits", make<TinyBvhPackets, true>},
+#endif
 };
 
 template <class T> bool read(std::vector<T> &values) {
@@ -384,6 +640,7 @@ int main(int argc, char **argv) {
             const char *space = strchr(mode.name, ' ');
             printf("%s\t%.*s\t", INSTRUCTIONS, int(space - mode.name), mode.name);
             if (mode.name[0] == 'e') printf("%zd.%zd.%zd", embree / 10000, embree / 100 % 100, embree % 100);
+            else if (mode.name[0] == 'm') printf("2");
             else printf("%d.%d.%d", TINY_BVH_VERSION_MAJOR, TINY_BVH_VERSION_MINOR, TINY_BVH_VERSION_SUB);
             printf("\t%s\n", space + 1);
         }

@@ -94,7 +94,7 @@ pub fn timed<R>(
 }
 
 /// The number of rays per call of the wide layout. Their answers fit into the first-level cache.
-const BATCH: usize = 1024;
+pub const BATCH: usize = 1024;
 
 /// Answers every ray in batches and returns the seconds of each part.
 fn in_batches(wide: &WideBvh, batch: &Batch, hits: &mut [Option<Hit>]) -> Vec<f64> {

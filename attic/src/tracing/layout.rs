@@ -1,10 +1,14 @@
 //! The layouts of our trees for tracing, and the instruction sets that they are limited to.
 
-use super::contender::{Contender, Tracer};
+use super::answers::SOME_HIT;
+use super::contender::{BATCH, Batch, Contender, PART, Tracer};
 use bvh_core::cost::SahConstants;
-use bvh_core::{Bvh, Kernel, WideBvh, collapse_leaves};
+use bvh_core::{
+    Bvh, Corners, DRay, DTriangle, DWideBvh, Hit, InvalidBvh, Kernel, Select, Triangle, WideBvh,
+    collapse_leaves,
+};
 use bvh_scenes::Scene;
-use bvh_scenes::trace::{Accelerator, Structure};
+use bvh_scenes::trace::{Accelerator, Query, Structure};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Instant;
@@ -28,6 +32,10 @@ pub enum Layout {
     WideBatchesAgain,
     /// [`WideBvh`] with portable code.
     WidePortable,
+    /// [`DWideBvh`], the same triangles and rays in f64.
+    WideDouble,
+    /// [`DWideBvh`] that traces batches of rays.
+    WideBatchesDouble,
 }
 
 /// An instruction set of the vector kernels.
@@ -53,6 +61,11 @@ impl Instructions {
 /// Returns true if a layout with this name is a second copy, measured for its noise.
 pub fn is_repeat(layout: &str) -> bool {
     layout.ends_with(", again")
+}
+
+/// Returns true if a layout with this name traces rays in f64.
+pub fn is_double(layout: &str) -> bool {
+    layout.contains("double")
 }
 
 /// Returns true if a layout with this name traces rays one by one.
@@ -84,6 +97,8 @@ impl Layout {
             Self::WideBatches => "wide, batches",
             Self::WideBatchesAgain => "wide, batches, again",
             Self::WidePortable => "wide, portable",
+            Self::WideDouble => "wide, double",
+            Self::WideBatchesDouble => "wide, batches, double",
         }
     }
 
@@ -141,13 +156,22 @@ fn own_contender<'a>(
     let triangles = scene.triangles().map_err(|error| error.to_string())?;
     let start = Instant::now();
     let wide = match layout {
-        Layout::Binary | Layout::BinaryLeaves => None,
+        Layout::Binary | Layout::BinaryLeaves | Layout::WideDouble | Layout::WideBatchesDouble => {
+            None
+        }
         _ => Some(match visits {
             Some(visits) => WideBvh::for_rays(tree, triangles, visits),
             None => WideBvh::new(tree, triangles),
         }),
     };
     let tracer = match wide {
+        None if is_double(layout.name()) => {
+            let wide = double(tree, triangles).map_err(|error| error.to_string())?;
+            let wide =
+                wide.with_kernel(kernel).ok_or_else(|| format!("{kernel:?} is not available"))?;
+            let is_single = layout == Layout::WideDouble;
+            Tracer::Other(Box::new(move |batch, hits| Ok(in_double(&wide, is_single, batch, hits))))
+        }
         None => {
             let tree = match layout {
                 Layout::Binary => Cow::Borrowed(tree),
@@ -179,4 +203,68 @@ fn own_contender<'a>(
         preparation_seconds: start.elapsed().as_secs_f64(),
         tracer,
     })
+}
+
+/// Lays out a tree over the same triangles in f64, in a frame around their middle.
+fn double(tree: &Bvh, triangles: &[Triangle]) -> Result<DWideBvh, InvalidBvh> {
+    let triangles: Vec<DTriangle> =
+        triangles.iter().map(|triangle| DTriangle(triangle.corners())).collect();
+    let frame = DWideBvh::centred(&triangles);
+    let mut tree = tree.clone();
+    tree.refit(&DWideBvh::boxes(&triangles, &frame));
+    tree.frame = Some(frame);
+    DWideBvh::new(&tree, &triangles)
+}
+
+/// Answers every ray in f64, singly or in batches, and returns the seconds of
+/// each part. Rays are converted before the clock starts, as those of other libraries are.
+fn in_double(
+    wide: &DWideBvh,
+    is_single: bool,
+    batch: &Batch,
+    hits: &mut [Option<Hit>],
+) -> Vec<f64> {
+    let all = Select::default();
+    let is_any = batch.query == Query::Any;
+    let mut nearest = [None; BATCH];
+    let mut any = [false; BATCH];
+    let mut seconds = Vec::new();
+    for (rays, hits) in batch.rays.chunks(PART).zip(hits.chunks_mut(PART)) {
+        let mut of_part = 0.0;
+        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            let rays: Vec<DRay> = rays
+                .iter()
+                .map(|ray| {
+                    let [origin, direction] = [ray.origin(), ray.direction()].map(|p| p.as_dvec3());
+                    DRay::new(origin, direction, ray.t_min().into(), ray.t_max().into())
+                        .expect("numbers of f32 that are rays there")
+                })
+                .collect();
+            let (nearest, any) = (&mut nearest[..rays.len()], &mut any[..rays.len()]);
+            let start = Instant::now();
+            match (is_single, is_any) {
+                (true, true) => {
+                    for (any, ray) in any.iter_mut().zip(&rays) {
+                        *any = wide.any_hit(ray, all);
+                    }
+                }
+                (true, false) => {
+                    for (nearest, ray) in nearest.iter_mut().zip(&rays) {
+                        *nearest = wide.nearest_hit(ray, all);
+                    }
+                }
+                (_, true) => wide.any_hits(&rays, all, any, batch.coherence),
+                (_, false) => wide.nearest_hits(&rays, all, nearest, batch.coherence),
+            }
+            of_part += start.elapsed().as_secs_f64();
+            for ((hit, nearest), any) in hits.iter_mut().zip(nearest).zip(any) {
+                *hit = match is_any {
+                    true => any.then_some(SOME_HIT),
+                    false => nearest.map(|hit| Hit { t: hit.t as f32, object: hit.object }),
+                };
+            }
+        }
+        seconds.push(of_part);
+    }
+    seconds
 }

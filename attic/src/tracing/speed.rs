@@ -230,12 +230,13 @@ mod tests {
         let mut config: Config = toml::from_str("count = 5000\nrounds = 2").unwrap();
         config.layouts.push(Layout::WideBatches);
         let mut contenders = Vec::new();
+        config.layouts.extend([Layout::WideDouble, Layout::WideBatchesDouble]);
         for (method, tree) in [("good", &good), ("bad", &bad)] {
             let own = own_contenders(&config.layouts, &[], &scene, tree, None).unwrap();
             contenders.extend(own.into_iter().map(|contender| (method.to_owned(), contender)));
         }
         let traced = measure(&config, &scene, &good, &contenders, 1, || false).unwrap().unwrap();
-        assert_eq!(traced.len(), 40);
+        assert_eq!(traced.len(), 56);
         for traced in &traced {
             let TraceTimeRow { seconds, median_seconds, .. } = traced.times;
             assert!(0.0 < seconds && seconds <= median_seconds);

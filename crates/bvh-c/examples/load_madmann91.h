@@ -2,7 +2,7 @@
 
 #pragma once
 
-#include <bvh/v2/bvh_search.h>
+#include <bvh/v2/bvh.h>
 #include <bvh/v2/node.h>
 
 #include <cstdint>

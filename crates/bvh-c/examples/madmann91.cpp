@@ -53,7 +53,7 @@ int main(int count, char **arguments) {
     search.objects.vertices = corners.data(), search.objects.count = triangles.size();
     search.references = 1.3, search.work = 3000000;
     BvsTree *tree = bvs_tree_bake(&search);
-    if (!tree || bvs_tree_export(tree, "madmann91-bvh", path) != BVS_STATUS_OK) return std::puts(bvs_last_error()), EXIT_FAILURE;
+    if (!tree || bvs_tree_export(tree, "madmann91-bvh", 0, path) != BVS_STATUS_OK) return std::puts(bvs_last_error()), EXIT_FAILURE;
     bvs_tree_free(tree);
     Bvh ours = load(path);
 

@@ -36,7 +36,7 @@ int main(int count, char **arguments) {
     search.objects.vertices = corners.data(), search.objects.count = triangles;
     search.references = 1.3, search.work = 3000000;
     BvsTree *tree = bvs_tree_bake(&search);
-    if (!tree || bvs_tree_export(tree, "tinybvh", path) != BVS_STATUS_OK) return std::puts(bvs_last_error()), EXIT_FAILURE;
+    if (!tree || bvs_tree_export(tree, "tinybvh", 0, path) != BVS_STATUS_OK) return std::puts(bvs_last_error()), EXIT_FAILURE;
 
     std::vector<BvsRay> rays(100000);
     for (BvsRay &ray : rays) {

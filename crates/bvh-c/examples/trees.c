@@ -17,7 +17,7 @@ static int bake(const float *corners, size_t count, const char *path) {
     BvsBake search = {.objects = {.vertices = corners, .count = count}, .rays = &rays[0][0], .ray_count = STEPS};
     search.seconds = 0.05;
     BvsTree *tree = bvs_tree_bake(&search);
-    int is_saved = tree && bvs_tree_export(tree, "obvhs", path) == 0 && bvs_tree_save(tree, path) == 0;
+    int is_saved = tree && bvs_tree_export(tree, "obvhs", 0, path) == 0 && bvs_tree_save(tree, path) == 0;
     bvs_tree_free(tree);
     return is_saved;
 }

@@ -457,10 +457,13 @@ fn files_are_those_of_the_library_and_a_wrong_one_is_named() {
     unsafe {
         for target in Target::ALL {
             let tracer = CString::new(target.name).unwrap();
-            ok(bvs_tree_export(tree, tracer.as_ptr(), named.as_ptr()));
-            assert_eq!(std::fs::read(&path).unwrap(), (*tree).owned.export(&target).unwrap());
+            ok(bvs_tree_export(tree, tracer.as_ptr(), 0, named.as_ptr()));
+            assert_eq!(
+                std::fs::read(&path).unwrap(),
+                (*tree).owned.export(&target, false).unwrap()
+            );
         }
-        let status = bvs_tree_export(tree, c"embree".as_ptr(), named.as_ptr());
+        let status = bvs_tree_export(tree, c"embree".as_ptr(), 0, named.as_ptr());
         invalid(status, "tracer is \"embree\"; accepted: three-mesh-bvh, ");
         ok(bvs_tree_save(tree, named.as_ptr()));
         let loaded = bvs_tree_load(named.as_ptr(), &objects);
@@ -621,6 +624,12 @@ fn a_budget_of_work_and_none_at_all_give_the_file_of_the_rust_crates() {
         // SAFETY: every pointer comes with its array's length, and the tree is freed once.
         unsafe {
             let tree = bvs_tree_bake(&bake);
+            if (*tree).owned.tree().prim_ids.len() > triangles.len() {
+                let tracer = c"three-mesh-bvh".as_ptr();
+                let status = bvs_tree_export(tree, tracer, 0, name.as_ptr());
+                invalid(status, "a query of three-mesh-bvh for all hits");
+                ok(bvs_tree_export(tree, tracer, 1, name.as_ptr()));
+            }
             ok(bvs_tree_save(tree, name.as_ptr()));
             bvs_tree_free(tree);
         }
@@ -639,6 +648,20 @@ fn a_budget_of_work_and_none_at_all_give_the_file_of_the_rust_crates() {
         assert_eq!(expected.reasons().len() > 1, work == 0);
         let expected = expected.save().unwrap();
         assert!(std::fs::read(&path).unwrap() == expected, "{references}, {} rays", rays.len());
+    }
+}
+
+#[test]
+fn a_bake_over_nothing_gives_an_empty_tree_within_a_budget_and_without() {
+    for work in [0, 1000] {
+        let bake = BvsBake { objects: soup(&[]), work, ..NO_BAKE };
+        // SAFETY: there are no arrays, and the tree is freed once.
+        unsafe {
+            let tree = bvs_tree_bake(&bake);
+            assert!(!tree.is_null(), "{}", last_error());
+            assert_eq!((*tree).owned.objects(), 0);
+            bvs_tree_free(tree);
+        }
     }
 }
 

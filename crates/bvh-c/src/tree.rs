@@ -441,13 +441,16 @@ pub unsafe extern "C" fn bvs_tree_save(tree: *const BvsTree, path: *const c_char
 }
 
 /// Writes the tree to the file `path`, in UTF-8, for the tracer of another library, by its name for
-/// `bvh export` (docs/INTEROP.md). The file is the same as of that command.
+/// `bvh export` (docs/INTEROP.md). The file is the same as of that command. A query for all hits of
+/// three-mesh-bvh, of the crate bvh and of a reader of json finds a divided triangle more than once:
+/// for these, `divided` is 1 if your queries are for the nearest or any hit. 0 rejects such a tree.
 ///
 /// `tree` is a tree; `tracer` and `path` are strings.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvs_tree_export(
     tree: *const BvsTree,
     tracer: *const c_char,
+    divided: u32,
     path: *const c_char,
 ) -> BvsStatus {
     status(|| {
@@ -457,7 +460,10 @@ pub unsafe extern "C" fn bvs_tree_export(
         let [tracer, path] = unsafe { [text("tracer", tracer)?, text("path", path)?] };
         let target = Target::named(tracer)
             .map_err(|unknown| Failure::invalid(format!("tracer is {unknown}")))?;
-        let bytes = tree.owned.export(&target).map_err(Failure::invalid)?;
+        if divided > 1 {
+            return Err(Failure::invalid(format!("divided is {divided}; accepted: 0 or 1")));
+        }
+        let bytes = tree.owned.export(&target, divided == 1).map_err(Failure::invalid)?;
         Ok(bvh_scenes::files::write(path.as_ref(), &bytes)?)
     })
 }

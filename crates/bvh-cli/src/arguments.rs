@@ -2,17 +2,42 @@
 
 use crate::Error;
 use crate::output::print_error;
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::{Bvh, DWideBvh};
 use bvh_scenes::files::{folder_of, regular};
-use bvh_scenes::{Scene, SceneError};
+use bvh_scenes::{Precision, Scene, SceneError, tree_file};
 use std::path::{Path, PathBuf};
 
 /// Loads a scene by name or path, and prints the remark on it, if it has one.
-pub fn load_scene(name: &str) -> Result<Scene, SceneError> {
-    let scene = Scene::load(name)?;
+pub fn load_scene(name: &str, precision: Precision) -> Result<Scene, SceneError> {
+    let scene = Scene::load_as(name, precision)?;
     if let Some(remark) = &scene.remark {
         print_error(remark);
     }
     Ok(scene)
+}
+
+/// Loads the scene of a tree file with the precision of its triangles.
+pub fn scene_of(tree: &Path, name: &str) -> Result<Scene, Error> {
+    Ok(load_scene(name, precision_of(tree)?)?)
+}
+
+/// Returns the precision of the triangles of a tree file.
+pub fn precision_of(tree: &Path) -> Result<Precision, Error> {
+    let is_double = tree_file::header(tree)?.is_double;
+    Ok(if is_double { Precision::Double } else { Precision::Single })
+}
+
+/// Returns the greedy tree over a scene: in its frame, or over triangles in f64 around their middle.
+pub fn greedy(scene: &Scene) -> Result<Bvh, Error> {
+    let frame = scene.frame.or_else(|| Some(DWideBvh::centred(scene.doubles().ok()?)));
+    let boxes = match &frame {
+        Some(frame) => &scene.primitives.boxes_in(Some(frame)),
+        None => &scene.boxes,
+    };
+    let greedy = muller_fellner::Config::default().build(boxes);
+    let greedy = greedy.map_err(Error::search(&scene.name, "muller_fellner"))?;
+    Ok(Bvh { frame, ..greedy })
 }
 
 /// Checks the path of a file to write: its name must have this ending, so that no file of another

@@ -2,16 +2,18 @@
 
 use crate::Error;
 use crate::answer::{Answer, gain};
-use crate::arguments::load_scene;
-use bvh_build::{Builder, muller_fellner};
+use crate::arguments::{greedy, scene_of};
+use bvh_core::cost::call_in_turn;
 use bvh_core::file::TreeFile;
-use bvh_core::{Bvh, Coherence, Hit, Ray, Triangle, WideBvh};
+use bvh_core::{Bvh, Coherence, DRay, DWideBvh, Hit, Primitives, Ray, Select, WideBvh};
 use bvh_scenes::rays::{Camera, Kind, of_anything};
 use bvh_scenes::render::framing;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_scenes::{Scene, SceneError};
 use clap::Args;
+use glam::Vec3;
 use serde_json::json;
+use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -48,13 +50,9 @@ struct Measured {
 
 /// Measures until the time is over, and prints one line per kind of rays.
 pub fn bench(args: &BenchArgs, answer: &mut Answer) -> Result<(), Error> {
-    let scene = load_scene(&args.scene)?;
-    let triangles = scene.triangles()?;
-    let greedy = muller_fellner::Config::default().build(&scene.boxes);
-    let greedy = greedy.map_err(Error::search(&scene.name, "muller_fellner"))?;
-    let baked = layout(&args.file, &scene, triangles)?;
-    let invalid = |error| SceneError::new(&scene.name, error);
-    let layouts = [baked, WideBvh::new(&greedy, triangles).map_err(invalid)?];
+    let scene = scene_of(&args.file, &args.scene)?;
+    let greedy = greedy(&scene)?;
+    let layouts = [Layout::of_file(&args.file, &scene)?, Layout::new(&scene, &greedy, None)?];
     let mut kinds = rays(&scene, &greedy);
     let start = Instant::now();
     let mut round = 0;
@@ -63,7 +61,7 @@ pub fn bench(args: &BenchArgs, answer: &mut Answer) -> Result<(), Error> {
             // What comes second finds its rays in the cache.
             let mut seconds = [0.0; 2];
             for which in [round % 2, 1 - round % 2] {
-                seconds[which] = traced(&layouts[which], measured.kind, &measured.rays);
+                seconds[which] = layouts[which].traced(measured.kind, &measured.rays);
             }
             measured.seconds.push(seconds);
         }
@@ -78,19 +76,79 @@ pub fn bench(args: &BenchArgs, answer: &mut Answer) -> Result<(), Error> {
     Ok(())
 }
 
-/// Reads the tree in a file, and lays it out as its search assumed.
-fn layout(path: &Path, scene: &Scene, triangles: &[Triangle]) -> Result<WideBvh, Error> {
-    let bytes = tree_file::read(path)?;
-    let read = || {
-        let file = TreeFile::open(&bytes)?.for_boxes(&scene.boxes)?;
-        let call_both = bvh_core::cost::call_in_turn;
-        let tree = file.tree_over(&scene.boxes, Some(&scene.primitives), &call_both)?;
-        Ok(match file.visits()? {
-            Some(visits) => WideBvh::for_rays(&tree, triangles, &visits)?,
-            None => WideBvh::new(&tree, triangles)?,
-        })
-    };
-    Ok(read().map_err(TreeFileError::of(path))?)
+/// A tree and its triangles in the wide layout.
+enum Layout {
+    Single(WideBvh),
+    Double(DWideBvh),
+}
+
+impl Layout {
+    /// Lays out a tree over a scene's triangles, as its search assumed if there are visits.
+    fn new(scene: &Scene, tree: &Bvh, visits: Option<&[f32]>) -> Result<Self, Error> {
+        let invalid = |error| SceneError::new(&scene.name, error);
+        if let Primitives::Doubles(triangles) = &scene.primitives {
+            return Ok(Self::Double(DWideBvh::new(tree, triangles).map_err(invalid)?));
+        }
+        let triangles = scene.triangles()?;
+        let wide = match visits {
+            Some(visits) => WideBvh::for_rays(tree, triangles, visits),
+            None => WideBvh::new(tree, triangles),
+        };
+        Ok(Self::Single(wide.map_err(invalid)?))
+    }
+
+    /// Lays out the tree in a file.
+    fn of_file(path: &Path, scene: &Scene) -> Result<Self, Error> {
+        let bytes = tree_file::read(path)?;
+        let objects = Some(&scene.primitives);
+        let read = || {
+            let file = TreeFile::open(&bytes)?.for_objects(&scene.boxes, objects)?;
+            let tree = file.tree_over(&scene.boxes, objects, &call_in_turn)?;
+            Ok((tree, file.visits()?))
+        };
+        let (tree, visits) = read().map_err(TreeFileError::of(path))?;
+        Self::new(scene, &tree, visits.as_deref())
+    }
+
+    /// Returns the seconds that rays take.
+    fn traced(&self, kind: Kind, rays: &[Ray]) -> f64 {
+        let coherence = match kind {
+            Kind::Primary => Coherence::Coherent,
+            _ => Coherence::Incoherent,
+        };
+        let is_any = kind == Kind::Shadow;
+        let mut found = vec![false; rays.len()];
+        match self {
+            Self::Single(wide) => {
+                let mut hits = vec![Hit::MISS; rays.len()];
+                timed(|| match is_any {
+                    true => wide.any_hits(rays, black_box(&mut found), coherence),
+                    false => wide.nearest_hits(rays, black_box(&mut hits), coherence),
+                })
+            }
+            Self::Double(wide) => {
+                let mut hits = vec![None; rays.len()];
+                let rays: Vec<DRay> = rays.iter().filter_map(double).collect();
+                let (found, hits) = (&mut found[..rays.len()], &mut hits[..rays.len()]);
+                let all = Select::default();
+                timed(|| match is_any {
+                    true => wide.any_hits(&rays, all, black_box(found), coherence),
+                    false => wide.nearest_hits(&rays, all, black_box(hits), coherence),
+                })
+            }
+        }
+    }
+}
+
+fn double(ray: &Ray) -> Option<DRay> {
+    let [origin, direction] = [ray.origin(), ray.direction()].map(Vec3::as_dvec3);
+    DRay::new(origin, direction, ray.t_min().into(), ray.t_max().into()).ok()
+}
+
+fn timed(trace: impl FnOnce()) -> f64 {
+    let start = Instant::now();
+    trace();
+    start.elapsed().as_secs_f64()
 }
 
 /// Returns rays of every kind: through a picture of the scene, row by row, and from anywhere.
@@ -117,21 +175,6 @@ fn rays(scene: &Scene, tree: &Bvh) -> Vec<Measured> {
         .into_iter()
         .filter(|measured| !measured.rays.is_empty())
         .collect()
-}
-
-/// Returns the seconds that rays take.
-fn traced(layout: &WideBvh, kind: Kind, rays: &[Ray]) -> f64 {
-    let mut hits = vec![Hit::MISS; rays.len()];
-    let mut found = vec![false; rays.len()];
-    let start = Instant::now();
-    match kind {
-        Kind::Primary => layout.nearest_hits(rays, &mut hits, Coherence::Coherent),
-        Kind::Shadow => layout.any_hits(rays, &mut found, Coherence::Incoherent),
-        _ => layout.nearest_hits(rays, &mut hits, Coherence::Incoherent),
-    }
-    let seconds = start.elapsed().as_secs_f64();
-    std::hint::black_box((hits, found));
-    seconds
 }
 
 /// Returns the median, and the ends of its 95 % interval, which are values themselves: another

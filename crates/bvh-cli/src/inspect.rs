@@ -3,10 +3,9 @@
 
 use crate::Error;
 use crate::answer::{Answer, frame_facts, saved};
-use crate::arguments::{load_scene, output_file};
+use crate::arguments::{greedy, output_file, scene_of};
 use crate::output::write_table;
 use crate::rays::Rays;
-use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::Header;
 use bvh_core::{Bvh, NodeKind};
@@ -41,7 +40,7 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
         output_file("--nodes", nodes, "csv")?;
     }
     let rays = args.rays.as_deref().map(Rays::read).transpose()?;
-    let scene = args.scene.as_deref().map(load_scene).transpose()?;
+    let scene = args.scene.as_deref().map(|scene| scene_of(&args.file, scene)).transpose()?;
     let (tree, header) = tree_file::load(&args.file, scene.as_ref())?;
     // Rays that miss the scene are rejected before the first fact is printed.
     let tests = match (&rays, &scene) {
@@ -65,7 +64,7 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
     measure(&tree, answer);
     // The build cannot fail, because a valid tree over these boxes proves that they are finite.
     if let Some(scene) = &scene
-        && let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes)
+        && let Ok(greedy) = greedy(scene)
     {
         let base = cost::internal_area(&greedy);
         answer.fact("greedy area", base);

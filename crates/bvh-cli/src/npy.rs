@@ -1,7 +1,7 @@
 //! Recorded rays as an array that `numpy.save` wrote.
 
-/// Returns the numbers of an array of shape (n, 6) or (n, 2, 3), `float32` or `float64`. Doubles are
-/// rounded. The format is described in `numpy.lib.format`.
+/// Returns the numbers of an array of shape (n, 6) or (n, 2, 3), `float32` or `float64` in either
+/// order of bytes, row by row, in whatever order the file has them. Doubles are rounded. The format is described in `numpy.lib.format`.
 ///
 /// # Errors
 ///
@@ -9,25 +9,41 @@
 pub fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
     let (header, data) = split(bytes).ok_or("the file is not an array of numpy")?;
     let rejected = |accepted: &str| Err(format!("the array is {header}; accepted: {accepted}"));
-    let size = match header.split_once("'descr':'<f") {
-        Some((_, kind)) if kind.starts_with("4'") => size_of::<f32>(),
-        Some((_, kind)) if kind.starts_with("8'") => size_of::<f64>(),
+    let kind = header.split_once("'descr':'").and_then(|(_, rest)| rest.split_once('\''));
+    let (is_big, size) = match kind.map(|(kind, _)| kind) {
+        Some("<f4") => (false, size_of::<f32>()),
+        Some("<f8") => (false, size_of::<f64>()),
+        Some(">f4") => (true, size_of::<f32>()),
+        Some(">f8") => (true, size_of::<f64>()),
         _ => return rejected("float32 or float64"),
     };
-    let segments = match shape(&header).as_deref() {
-        Some(&[segments, 6] | &[segments, 2, 3]) if header.contains("'fortran_order':False") => {
-            segments
-        }
-        _ => return rejected("(n, 6) or (n, 2, 3) in row order"),
+    // The column of each of a segment's six numbers, of the array of columns.
+    let (segments, columns) = match shape(&header).as_deref() {
+        Some(&[segments, 6]) => (segments, [0, 1, 2, 3, 4, 5]),
+        Some(&[segments, 2, 3]) => (segments, [0, 2, 4, 1, 3, 5]),
+        _ => return rejected("(n, 6) or (n, 2, 3)"),
     };
     // A copy that was cut off would otherwise train the tree for a part of its rays.
     if segments.checked_mul(6 * size) != Some(data.len()) {
         return Err(format!("the array is {header} and has {} bytes of data", data.len()));
     }
-    Ok(match size {
-        4 => data.as_chunks().0.iter().map(|&single| f32::from_le_bytes(single)).collect(),
-        _ => data.as_chunks().0.iter().map(|&double| f64::from_le_bytes(double) as f32).collect(),
-    })
+    let single = |&bytes: &[u8; 4]| match is_big {
+        true => f32::from_be_bytes(bytes),
+        false => f32::from_le_bytes(bytes),
+    };
+    let double = |&bytes: &[u8; 8]| match is_big {
+        true => f64::from_be_bytes(bytes) as f32,
+        false => f64::from_le_bytes(bytes) as f32,
+    };
+    let numbers: Vec<f32> = match size {
+        4 => data.as_chunks().0.iter().map(single).collect(),
+        _ => data.as_chunks().0.iter().map(double).collect(),
+    };
+    if !header.contains("'fortran_order':True") {
+        return Ok(numbers);
+    }
+    let row = |segment| columns.map(|column| numbers[column * segments + segment]);
+    Ok((0..segments).flat_map(row).collect())
 }
 
 /// Splits an array into its header, without spaces, and its data.
@@ -57,7 +73,12 @@ mod tests {
     use super::*;
 
     fn array(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
-        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        in_order("False", kind, shape, data)
+    }
+
+    fn in_order(columns: &str, kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let header =
+            format!("{{'descr': '{kind}', 'fortran_order': {columns}, 'shape': {shape}, }}\n");
         let length = (header.len() as u16).to_le_bytes();
         [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), data].concat()
     }
@@ -69,6 +90,21 @@ mod tests {
         let double = numbers.map(|x| f64::from(x).to_le_bytes()).concat();
         assert_eq!(read_npy(&array("<f4", "(1, 6)", &single)).unwrap(), numbers);
         assert_eq!(read_npy(&array("<f8", "(1, 2, 3)", &double)).unwrap(), numbers);
+        let single = numbers.map(f32::to_be_bytes).concat();
+        let double = numbers.map(|x| f64::from(x).to_be_bytes()).concat();
+        assert_eq!(read_npy(&array(">f4", "(1, 6)", &single)).unwrap(), numbers);
+        assert_eq!(read_npy(&array(">f8", "(1, 2, 3)", &double)).unwrap(), numbers);
+    }
+
+    #[test]
+    fn arrays_in_the_order_of_columns_give_the_same_segments() {
+        // Row by row, the numbers are 0 to 11.
+        let rows: Vec<f32> = (0..12u8).map(f32::from).collect();
+        let bytes = |order: [u8; 12]| order.map(|x| f32::from(x).to_le_bytes()).concat();
+        let pairs = bytes([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11]);
+        let triples = bytes([0, 6, 3, 9, 1, 7, 4, 10, 2, 8, 5, 11]);
+        assert_eq!(read_npy(&in_order("True", "<f4", "(2, 6)", &pairs)).unwrap(), rows);
+        assert_eq!(read_npy(&in_order("True", "<f4", "(2, 2, 3)", &triples)).unwrap(), rows);
     }
 
     #[test]
@@ -76,7 +112,7 @@ mod tests {
         for (bytes, message) in [
             (b"PK".to_vec(), "not an array"),
             (array("<i8", "(1, 6)", &[0; 48]), "accepted: float32 or float64"),
-            (array(">f4", "(1, 6)", &[0; 24]), "accepted: float32 or float64"),
+            (array("<f2", "(1, 6)", &[0; 12]), "accepted: float32 or float64"),
             (array("<f4", "(2, 6)", &[0; 24]), "has 24 bytes of data"),
             (array("<f8", "(1, 6)", &[0; 52]), "has 52 bytes of data"),
             (array("<f4", "(1, 1, 6)", &[0; 24]), "accepted: (n, 6) or (n, 2, 3)"),

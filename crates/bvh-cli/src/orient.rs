@@ -29,7 +29,7 @@ pub struct OrientArgs {
     pub scene: PathBuf,
     /// The file to write, replaced when it is complete. If the scene names other files, in the same
     /// folder.
-    #[arg(long, value_name = "FILE.glb|.obj")]
+    #[arg(short, long, value_name = "FILE.glb|.obj")]
     pub out: PathBuf,
     /// Print for every turned mesh the number of triangles, and the area that a tree saves, by short
     /// searches over a sample of large meshes.

@@ -148,16 +148,19 @@ fn read_floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
     Ok(floats.iter().map(|&float| f32::from_le_bytes(float)).collect())
 }
 
-/// Reads lines of six numbers, separated by commas. The first line may be a header, which has no
-/// number, and lines may be blank.
+/// Reads lines of six numbers, separated by commas, semicolons or blanks. The first line may be a
+/// header, which has no number, and lines may be blank.
 fn read_csv(bytes: &[u8]) -> Result<Vec<f32>, String> {
     let text = str::from_utf8(bytes).map_err(|_| "the file is not UTF-8".to_owned())?;
     // Spreadsheets begin UTF-8 with this mark, which would make the first number a word.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut numbers = Vec::new();
     for (line_number, line) in (1..).zip(text.lines()) {
-        let fields: Vec<Option<f32>> =
-            line.split(',').map(|field| field.trim().parse().ok()).collect();
+        let number = |field: &str| field.trim().parse().ok();
+        let fields: Vec<Option<f32>> = match line.find([',', ';']) {
+            Some(place) => line.split(char::from(line.as_bytes()[place])).map(number).collect(),
+            None => line.split_whitespace().map(number).collect(),
+        };
         let is_header = line_number == 1 && fields.iter().all(Option::is_none);
         if is_header || line.trim().is_empty() {
             continue;
@@ -183,6 +186,8 @@ mod tests {
             ("bin", floats),
             ("csv", b"x,y,z,to x,to y,to z\n1,2,3, 4,5,-6.5\n".to_vec()),
             ("csv", b"1,2,3,4,5,-6.5".to_vec()),
+            ("csv", b"x;y;z;a;b;c\n1;2;3;4;5; -6.5\n".to_vec()),
+            ("csv", b"# x y\n1.0e0 2 3\t4  5 -6.5 \n".to_vec()),
             ("csv", "\u{feff}1,2,3,4,5,-6.5\r\n".into()),
         ] {
             assert_eq!(recorded(format, &bytes), Ok(vec![SEGMENT]), "{format}");
@@ -194,6 +199,12 @@ mod tests {
         for (format, bytes, message) in [
             ("bin", vec![0; 7], "there are 7 bytes; accepted: a multiple of 24"),
             ("bin", vec![0; 28], "there are 7 numbers; accepted: six for each segment"),
+            (
+                "csv",
+                b"1;2;3;4;5;6,5".to_vec(),
+                "line 1 is \"1;2;3;4;5;6,5\"; accepted: six numbers",
+            ),
+            ("csv", b"1,,3,4,5,6,7".to_vec(), "line 1 is \"1,,3,4,5,6,7\"; accepted: six numbers"),
             ("csv", b"1,2,3,4,5,6\n1,2,3".to_vec(), "line 2 is \"1,2,3\"; accepted: six numbers"),
             (
                 "csv",

@@ -2,15 +2,14 @@
 
 use crate::Error;
 use crate::answer::{Answer, whole};
-use crate::arguments::{input_file, load_scene, output_file};
+use crate::arguments::{greedy, input_file, load_scene, output_file, precision_of};
 use crate::output::{bar, png};
-use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, WideBvh};
 use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::rays::View;
 use bvh_scenes::render::{Options, framing, heat, render as draw};
 use bvh_scenes::trace::{Accelerator, KdTree, Structure};
-use bvh_scenes::{Scene, tree_file};
+use bvh_scenes::{Precision, Scene, tree_file};
 use glam::DVec3;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -23,7 +22,7 @@ pub struct RenderArgs {
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// The picture, a PNG file.
-    #[arg(long, value_name = "FILE.png")]
+    #[arg(short, long, value_name = "FILE.png")]
     pub out: PathBuf,
     /// The acceleration structure: brute, kdtree, bvh, wide, or a saved tree. It changes only the
     /// time.
@@ -89,11 +88,14 @@ impl RenderArgs {
 
 /// Draws the picture, writes it, and prints its times.
 pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
-    if args.accel.ends_with(".bvh") {
-        input_file("--accel", Path::new(&args.accel))?;
+    let accel = Path::new(&args.accel);
+    let is_file = args.accel.ends_with(".bvh");
+    if is_file {
+        input_file("--accel", accel)?;
     }
     output_file("--out", &args.out, "png")?;
-    let scene = load_scene(&args.scene)?;
+    let precision = if is_file { precision_of(accel)? } else { Precision::Single };
+    let scene = load_scene(&args.scene, precision)?;
     if args.heatmap && args.accel == "wide" {
         return Err(Error::Usage(
             "--heatmap: the wide layout counts no tests; \
@@ -140,22 +142,18 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
 /// Builds the structure that `--accel` names over the scene. Trees are built by greedy Müller–Fellner
 /// division.
 fn structure(name: &str, scene: &Scene) -> Result<Structure<'static>, Error> {
-    let greedy = || {
-        let tree = muller_fellner::Config::default().build(&scene.boxes);
-        tree.map_err(Error::search(&scene.name, name))
-    };
     Ok(match name {
         "brute" => Structure::Brute,
         "kdtree" => {
             let tree = KdTree::build(&scene.boxes);
             Structure::KdTree(tree.map_err(Error::search(&scene.name, name))?)
         }
-        "bvh" => Structure::Tree(Cow::Owned(greedy()?)),
+        "bvh" => Structure::Tree(Cow::Owned(greedy(scene)?)),
         "wide" => {
             let triangles = scene.triangles().map_err(|fault| {
                 Error::Usage(format!("--accel wide: {fault}, or --accel brute, kdtree, bvh"))
             })?;
-            let layout = WideBvh::new(&greedy()?, triangles);
+            let layout = WideBvh::new(&greedy(scene)?, triangles);
             Structure::Wide(layout.map_err(Error::search(&scene.name, name))?)
         }
         _ if name.ends_with(".bvh") => {

@@ -2,12 +2,11 @@
 
 use crate::Error;
 use crate::answer::{Answer, short, snake, whole};
-use crate::arguments::{load_scene, output_file, output_or_free};
+use crate::arguments::{greedy, output_file, output_or_free, scene_of};
 use crate::output::png;
 use crate::rays::Rays;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
 use bvh_core::file::Header;
@@ -32,7 +31,7 @@ pub struct ReportArgs {
     pub scene: String,
     /// The page, an HTML file without scripts that refers to no other file. The default is the name
     /// of the tree file with the extension html, which must be free.
-    #[arg(long, value_name = "FILE.html")]
+    #[arg(short, long, value_name = "FILE.html")]
     pub out: Option<PathBuf>,
 }
 
@@ -47,11 +46,9 @@ type Fact = (&'static str, f64);
 pub fn report(args: &ReportArgs, answer: &mut Answer) -> Result<(), Error> {
     let out = output_or_free(args.out.as_ref(), || args.file.with_extension("html"))?;
     output_file("--out", &out, "html")?;
-    let scene = load_scene(&args.scene)?;
+    let scene = scene_of(&args.file, &args.scene)?;
     let (tree, header) = tree_file::load(&args.file, &scene)?;
-    let greedy = muller_fellner::Config::default()
-        .build(&scene.boxes)
-        .map_err(Error::search(&scene.name, "muller_fellner"))?;
+    let greedy = greedy(&scene)?;
     let view = framing::automatic(&scene, f64::from(WIDTH) / f64::from(HEIGHT));
     let (facts, film) = measure(&tree, &greedy, &scene, &view)?;
     let (facts_of_greedy, film_of_greedy) = measure(&greedy, &greedy, &scene, &view)?;
@@ -118,7 +115,7 @@ fn measure(
         ("Depth", tree.depth() as f64),
         ("Nodes", tree.nodes.len() as f64),
     ];
-    if scene.triangles().is_ok() {
+    if scene.has_triangles() {
         let tests = Rays::Default.expected_tests(tree, scene)?;
         facts.insert(2, ("Expected tests of a ray from anywhere", tests));
     }

@@ -7,7 +7,7 @@
 
 use crate::exact::{Line, Verdict, is_degenerate};
 use crate::triangle::{normal_of, offset_from};
-use crate::{Aabb, Corners, Frame};
+use crate::{Aabb, Corners, Frame, Hit, Ray, Triangle};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -191,9 +191,32 @@ pub struct Select<'a> {
     pub exclude: &'a [u32],
 }
 
-impl Select<'_> {
-    pub(crate) fn counts_all(&self) -> bool {
+impl<'a> Select<'a> {
+    /// Returns whether all hits count.
+    pub fn counts_all(&self) -> bool {
         self.orientation == Orientation::Any && self.exclude.is_empty()
+    }
+
+    /// Returns the filter of a ray in f32 over `triangles`, by id, for
+    /// [`WideBvh::nearest_hit_where`](crate::WideBvh::nearest_hit_where) and
+    /// [`any_hit_where`](crate::WideBvh::any_hit_where): whether a hit counts, exactly.
+    pub fn filter(self, ray: &'a Ray, triangles: &'a [Triangle]) -> impl FnMut(Hit) -> bool + 'a {
+        let ends = [ray.origin(), ray.direction()];
+        move |Hit { object, .. }| {
+            let Triangle(corners) = &triangles[object as usize];
+            self.admits(object, || Line::new(ends[0], ends[1]).side(ends, corners))
+        }
+    }
+
+    /// Returns whether a hit counts on a triangle to which the ray comes from a
+    /// [side](Line::side).
+    fn admits(&self, object: u32, side: impl FnOnce() -> i32) -> bool {
+        !self.exclude.contains(&object)
+            && match self.orientation {
+                Orientation::Any => true,
+                Orientation::Exiting => side() > 0,
+                Orientation::Entering => side() < 0,
+            }
     }
 
     /// Returns those of some hits that are of the orientation, by the bits of those along the normal.
@@ -396,13 +419,8 @@ impl Query<'_> {
     /// Returns whether hits of a triangle count.
     #[inline(never)]
     pub(crate) fn counts(&self, object: u32) -> bool {
-        let Select { orientation, exclude } = self.select;
-        if orientation == Orientation::Any {
-            return !exclude.contains(&object);
-        }
-        let side = if orientation == Orientation::Exiting { 1 } else { -1 };
         let DTriangle(corners) = &self.triangles[object as usize];
-        !exclude.contains(&object) && self.line().side(self.ends(), corners) == side
+        self.select.admits(object, || self.line().side(self.ends(), corners))
     }
 
     /// Finds bounds of the distance in f64.

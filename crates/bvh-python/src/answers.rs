@@ -28,6 +28,8 @@ pub struct Call<'a, 'py, N: Real> {
     pub py: Python<'py>,
     pub progress: Option<Py<PyAny>>,
     pub layout: &'a N::Layout,
+    /// The triangles of the layout by their indices.
+    pub triangles: &'a [N::Triangle],
 }
 
 impl<'py, N: Real> Call<'_, 'py, N> {
@@ -37,7 +39,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         select: &Selection,
         hint: Hint,
     ) -> PyResult<(Reals<'py>, Column<'py, i32>)> {
-        let Self { py, progress, layout } = self;
+        let Self { py, progress, layout, triangles } = self;
         let (t, objects) = Query::ask(py, progress, source.rays.div_ceil(BATCH), |query| {
             let mut t = vec![N::default(); source.rays];
             let mut objects = vec![0; source.rays];
@@ -45,7 +47,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
             query.answer(parts, |number, (t, objects)| {
                 let rays = source.batch::<N>(number, BATCH)?;
                 let how = (select.batch(number, BATCH, rays.len()), hint.coherence::<N>(&rays));
-                let hits = N::nearest(layout, &rays, how);
+                let hits = N::nearest((layout, triangles), &rays, how);
                 for ((hit, t), object) in hits.iter().zip(t).zip(objects) {
                     (*t, *object) = N::parts(hit);
                 }
@@ -62,11 +64,11 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         select: &Selection,
         hint: Hint,
     ) -> PyResult<Column<'py, bool>> {
-        let layout = self.layout;
+        let scene = (self.layout, self.triangles);
         self.columns(source.rays, BATCH, |number, hits| {
             let rays = source.batch::<N>(number, BATCH)?;
             let how = (select.batch(number, BATCH, rays.len()), hint.coherence::<N>(&rays));
-            N::any(layout, &rays, how, hits);
+            N::any(scene, &rays, how, hits);
             Ok(())
         })
     }
@@ -75,7 +77,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         self,
         source: RaySource,
     ) -> PyResult<(Reals<'py>, Column<'py, i32>, Column<'py, i64>)> {
-        let Self { py, progress, layout } = self;
+        let Self { py, progress, layout, .. } = self;
         let parts = source.rays.div_ceil(FEW);
         let (t, objects, numbers) = Query::ask(py, progress, parts, |query| {
             let mut found = vec![(Vec::new(), Vec::new()); parts];
@@ -143,7 +145,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         self,
         points: &[Point<N>],
     ) -> PyResult<(Rows<'py, f64>, Column<'py, i32>, Column<'py, f64>)> {
-        let Self { py, progress, layout } = self;
+        let Self { py, progress, layout, .. } = self;
         let answer = |query: &Query| {
             let mut positions = vec![f64::NAN; 3 * points.len()];
             let mut objects = vec![-1; points.len()];
@@ -182,10 +184,9 @@ impl<'py, N: Real> Call<'_, 'py, N> {
     pub fn surfaces(
         self,
         source: RaySource,
-        triangles: &[N::Triangle],
         indices: &[i64],
     ) -> PyResult<(Column<'py, f64>, Column<'py, f64>, Reals<'py>)> {
-        let py = self.py;
+        let Self { py, triangles, .. } = self;
         let (u, v, normals) = Query::ask(py, None, source.rays.div_ceil(BATCH), |query| {
             let mut u = vec![0.0; source.rays];
             let mut v = vec![0.0; source.rays];

@@ -63,8 +63,11 @@ macro_rules! with_precision {
 }
 pub(crate) use with_precision;
 
-/// What counts, in `f64` only, and whether the rays are similar.
+/// What counts, and whether the rays are similar.
 type How<'a> = (Select<'a>, Coherence);
+
+/// A layout, and its triangles by their indices.
+type Scene<'a, N> = (&'a <N as Real>::Layout, &'a [<N as Real>::Triangle]);
 
 /// A number of coordinates, and how triangles with such corners are traced.
 pub trait Real: Number + Pod + Default {
@@ -92,9 +95,9 @@ pub trait Real: Number + Pod + Default {
     /// Returns the origin and the direction.
     fn ends(ray: &Self::Ray) -> [DVec3; 2];
 
-    fn nearest(layout: &Self::Layout, rays: &[Self::Ray], how: How) -> Vec<Self::Hit>;
+    fn nearest(scene: Scene<Self>, rays: &[Self::Ray], how: How) -> Vec<Self::Hit>;
 
-    fn any(layout: &Self::Layout, rays: &[Self::Ray], how: How, hits: &mut [bool]);
+    fn any(scene: Scene<Self>, rays: &[Self::Ray], how: How, hits: &mut [bool]);
 
     /// Appends all hits, ray after ray, and writes how many each ray has.
     fn all(
@@ -119,6 +122,13 @@ fn wrong(part: &str, found: DVec3, accepted: &str) -> String {
 fn inward([t_min, t_max]: [f64; 2]) -> [f32; 2] {
     let up = |t: f64| if f64::from(t as f32) < t { (t as f32).next_up() } else { t as f32 };
     [up(t_min), -up(-t_max)]
+}
+
+/// Returns what counts for each of some rays, which exclude the same number of triangles.
+fn each(select: Select, rays: usize) -> impl Iterator<Item = Select> {
+    let excluded = select.exclude.len().checked_div(rays).unwrap_or(0);
+    (0..rays)
+        .map(move |ray| Select { exclude: &select.exclude[ray * excluded..][..excluded], ..select })
 }
 
 impl Real for f32 {
@@ -172,14 +182,26 @@ impl Real for f32 {
         [ray.origin(), ray.direction()].map(Vec3::as_dvec3)
     }
 
-    fn nearest(layout: &WideBvh, rays: &[Ray], (_, coherence): How) -> Vec<Hit> {
+    fn nearest((layout, all): Scene<f32>, rays: &[Ray], (select, coherence): How) -> Vec<Hit> {
         let mut hits = vec![Hit::MISS; rays.len()];
-        layout.nearest_hits(rays, &mut hits, coherence);
+        if select.counts_all() {
+            layout.nearest_hits(rays, &mut hits, coherence);
+        } else {
+            for ((hit, ray), select) in hits.iter_mut().zip(rays).zip(each(select, rays.len())) {
+                *hit = layout.nearest_hit_where(ray, select.filter(ray, all)).unwrap_or(Hit::MISS);
+            }
+        }
         hits
     }
 
-    fn any(layout: &WideBvh, rays: &[Ray], (_, coherence): How, hits: &mut [bool]) {
-        layout.any_hits(rays, hits, coherence);
+    fn any((layout, all): Scene<f32>, rays: &[Ray], how: How, hits: &mut [bool]) {
+        let (select, coherence) = how;
+        if select.counts_all() {
+            return layout.any_hits(rays, hits, coherence);
+        }
+        for ((hit, ray), select) in hits.iter_mut().zip(rays).zip(each(select, rays.len())) {
+            *hit = layout.any_hit_where(ray, select.filter(ray, all));
+        }
     }
 
     fn all(layout: &WideBvh, rays: &[Ray], hits: &mut Vec<Hit>, counts: &mut [u32]) {
@@ -240,14 +262,15 @@ impl Real for f64 {
         [ray.origin(), ray.direction()]
     }
 
-    fn nearest(layout: &DWideBvh, rays: &[DRay], (select, coherence): How) -> Vec<DHit> {
+    fn nearest((layout, _): Scene<f64>, rays: &[DRay], (select, coherence): How) -> Vec<DHit> {
         const MISS: DHit = DHit { t: f64::INFINITY, object: u32::MAX };
         let mut hits = vec![None; rays.len()];
         layout.nearest_hits(rays, select, &mut hits, coherence);
         hits.into_iter().map(|hit| hit.unwrap_or(MISS)).collect()
     }
 
-    fn any(layout: &DWideBvh, rays: &[DRay], (select, coherence): How, hits: &mut [bool]) {
+    fn any((layout, _): Scene<f64>, rays: &[DRay], how: How, hits: &mut [bool]) {
+        let (select, coherence) = how;
         layout.any_hits(rays, select, hits, coherence);
     }
 

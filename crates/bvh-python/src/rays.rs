@@ -190,7 +190,7 @@ impl Selection {
         orientation: &str,
         exclude: Option<&Bound<PyAny>>,
         rays: usize,
-        (precision, triangles): (Precision, usize),
+        triangles: usize,
     ) -> PyResult<Self> {
         let sides = [
             ("any", Orientation::Any),
@@ -201,13 +201,6 @@ impl Selection {
             let accepted = sides.map(|side| side.0).join(", ");
             return Err(invalid(format!("orientation is {orientation:?}; accepted: {accepted}")));
         };
-        let is_given = [orientation != Orientation::Any, exclude.is_some()];
-        for (name, is_given) in ["orientation", "exclude"].into_iter().zip(is_given) {
-            if is_given && precision == Precision::Single {
-                let accepted = "a tree with precision=\"double\"";
-                return Err(invalid(format!("{name}: the tree is single; accepted: {accepted}")));
-            }
-        }
         let Some(exclude) = exclude else {
             return Ok(Self { orientation, excluded: vec![], each: 0 });
         };

@@ -209,16 +209,24 @@ impl Tree {
     }
 
     /// Returns the file of `bvh export` for the tracer of another library, by its name there
-    /// (docs/INTEROP.md).
+    /// (docs/INTEROP.md). A query for all hits of three-mesh-bvh, of the crate bvh and of a reader of
+    /// json finds a divided triangle more than once: `divided=True` says that yours are for the
+    /// nearest or any hit. Otherwise such a tree is rejected.
     ///
     /// >>> import json
     /// >>> json.loads(square.export("json"))["nodes"]
     /// [[0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0, 2]]
-    fn export<'py>(&self, py: Python<'py>, tracer: &str) -> PyResult<Bound<'py, PyBytes>> {
+    #[pyo3(signature = (tracer, *, divided = false))]
+    fn export<'py>(
+        &self,
+        py: Python<'py>,
+        tracer: &str,
+        divided: bool,
+    ) -> PyResult<Bound<'py, PyBytes>> {
         let target =
             Target::named(tracer).map_err(|unknown| invalid(format!("tracer is {unknown}")))?;
         let owned = self.owned();
-        let bytes = detached(py, || owned.export(&target))?.map_err(invalid)?;
+        let bytes = detached(py, || owned.export(&target, divided))?.map_err(invalid)?;
         Ok(PyBytes::new(py, &bytes))
     }
 

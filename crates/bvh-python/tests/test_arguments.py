@@ -247,15 +247,13 @@ def test_numbers_beyond_the_exact_range_are_named_with_the_range(number):
     ("call", "message"),
     [
         (lambda: Tree.from_mesh(CORNERS, FACE, precision="half"), '^precision is "half"; accepted: single, double$'),
-        (lambda: Tracer(mesh()).nearest(*DOWN, exclude=0), '^exclude: the tree is single; accepted: a tree with precision="double"$'),
-        (lambda: Tracer(mesh()).any(*DOWN, orientation="exiting"), '^orientation: the tree is single; accepted: a tree with precision="double"$'),
         (lambda: Tracer(double()).any(*DOWN, orientation="inward"), '^orientation is "inward"; accepted: any, exiting, entering$'),
         (lambda: Tracer(double()).nearest(*DOWN, exclude=[0, 1]), "^exclude has 1; accepted: indices below 1, or -1$"),
         (lambda: Tracer(double()).nearest(*DOWN, exclude=-2), "^exclude has -2; accepted: indices below 1, or -1$"),
         (lambda: Tracer(double()).nearest(*DOWN, exclude=[0]), r"^exclude has shape \(1,\); accepted: one index, \(2,\) or \(2, k\), as origins$"),
         (lambda: Tracer(double()).any(*DOWN, exclude=[[[0]], [[0]]]), r"^exclude has shape \(2, 1, 1\); accepted: "),
         (lambda: Tracer(double()).any(*DOWN, exclude=[0.0, 1.0]), "^exclude has dtype float64; accepted: integers$"),
-        (lambda: double().export("json"), "accepted: a tree of a bake with the file's frame$"),
+        (lambda: double().export("json"), "accepted: a tree of a bake in single precision with the file's frame$"),
     ],
 )
 def test_errors_of_precisions_and_selections_name_the_argument(call, message):

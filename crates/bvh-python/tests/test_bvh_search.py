@@ -145,6 +145,16 @@ def test_other_tracers_get_all_objects_and_unknown_ones_are_rejected():
         tree.export("embree")
 
 
+def test_a_tree_that_divides_triangles_is_for_tracers_that_count_hits_only_if_one_says_so():
+    tree = Tree.from_triangles(TRIANGLES, work=300_000, references=1.5, frame="file")
+    assert len(tree.object_ids()) > len(tree)
+    tree.export("obvhs")
+    for tracer in ["three-mesh-bvh", "bvh", "json"]:
+        with pytest.raises(ValueError, match=f"references to {len(tree)} objects, and a query of {tracer}"):
+            tree.export(tracer)
+        tree.export(tracer, divided=True)
+
+
 def test_a_save_that_fails_leaves_the_old_file_whole(tmp_path):
     resource = pytest.importorskip("resource")
     path = tmp_path / "tree.bvh"

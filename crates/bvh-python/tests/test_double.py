@@ -83,9 +83,12 @@ def test_answers_are_those_of_rationals(place, size):
 def test_answers_are_those_of_a_single_tree_where_float32_has_all_numbers():
     triangles, origins, directions = (array.astype(np.float32) for array in soup((0, 0, 0), 1.0))
     single, double = (Tracer(Tree.from_triangles(triangles, work=2000, precision=name)) for name in ("single", "double"))
+    excluded = single.nearest(origins, directions)[1]
+    several = np.stack([excluded, np.full(len(excluded), -1), RANDOM.integers(0, len(triangles), len(excluded))], axis=1)
+    selections = [{"orientation": side, "exclude": ids} for side in ("exiting", "entering", "any") for ids in (excluded, several, several[:, :0])]
     for name in ("nearest", "any", "all", "counts"):
-        for limits in ((), (0.25, 1.5)):
-            answers = [getattr(tracer, name)(origins, directions, *limits) for tracer in (single, double)]
+        for limits, select in [((), {}), ((0.25, 1.5), {}), *(((), select) for select in selections if name in ("nearest", "any"))]:
+            answers = [getattr(tracer, name)(origins, directions, *limits, **select) for tracer in (single, double)]
             for expected, found in zip(*answers) if isinstance(answers[0], tuple) else [answers]:
                 np.testing.assert_array_equal(np.asarray(found, expected.dtype), expected)
     for name in ("contains", "signed_distance", "closest"):

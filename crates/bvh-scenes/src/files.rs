@@ -23,7 +23,13 @@ impl ReadError {
     /// Returns a function for `map_err` on errors of the system that names the file.
     pub fn of(path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |error| match error.kind() {
-            kind @ io::ErrorKind::NotFound => Self::new(path, kind, "no such file".into()),
+            kind @ io::ErrorKind::NotFound => {
+                let name = path.file_name().map(|name| name.to_string_lossy());
+                let files = fs::read_dir(folder_of(path)).into_iter().flatten().flatten();
+                let files = files.take(1000).map(|file| file.file_name().into_string());
+                let meant = did_you_mean(&name.unwrap_or_default(), files.flatten());
+                Self::new(path, kind, format!("no such file{meant}"))
+            }
             kind => Self::new(path, kind, format!("could not be read: {error}")),
         }
     }
@@ -37,6 +43,18 @@ impl ReadError {
     pub fn is_of_the_path(&self) -> bool {
         use io::ErrorKind::{InvalidData, InvalidInput, IsADirectory, NotFound};
         matches!(self.kind(), NotFound | IsADirectory | InvalidInput | InvalidData)
+    }
+}
+
+/// Returns the question after the nearest of these names, as `; did you mean escher?`, or nothing if
+/// none is near.
+pub(crate) fn did_you_mean(name: &str, known: impl Iterator<Item = String>) -> String {
+    const NEAR: f64 = 0.6;
+    let near = |known: String| (strsim::normalized_damerau_levenshtein(name, &known), known);
+    let nearest = known.map(near).max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(&a.1)));
+    match nearest {
+        Some((nearness, known)) if nearness >= NEAR => format!("; did you mean {known}?"),
+        _ => String::new(),
     }
 }
 

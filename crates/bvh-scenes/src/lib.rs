@@ -25,4 +25,4 @@ pub mod trace;
 pub mod tree_file;
 
 pub use fnv::fnv1a;
-pub use scene::{FETCHED, SPHERES, Scene, SceneError, SceneKind, fetched_path};
+pub use scene::{FETCHED, Precision, SPHERES, Scene, SceneError, SceneKind, fetched_path};

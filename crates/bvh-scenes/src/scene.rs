@@ -1,9 +1,12 @@
 //! A loaded scene, and the names that select one.
 
 use crate::builtin::{spheres, stand_ins, stiff};
+use crate::files::did_you_mean;
+use crate::fnv1a;
+use crate::load::mesh::FromFile;
+use crate::load::{self, MeshError};
 use crate::subset::Subset;
-use crate::{fnv1a, load};
-use bvh_core::{Aabb, Frame, Primitives, Triangle};
+use bvh_core::{Aabb, Corners, DTriangle, Frame, Primitives, Triangle};
 use glam::DVec3;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -44,6 +47,16 @@ pub struct Scene {
     pub frame: Option<Frame>,
     /// One line for the user about anything in the file besides plain triangles.
     pub remark: Option<String>,
+}
+
+/// The numbers of a scene's triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// f32, to which the coordinates of a file are rounded.
+    #[default]
+    Single,
+    /// f64, as the coordinates are in a file.
+    Double,
 }
 
 /// A scene that is neither built in, nor fetched, nor a readable mesh file, or that has no
@@ -88,17 +101,43 @@ impl Scene {
     ///
     /// [`SceneError`] reports the fault of the name or of the file, and the accepted names.
     pub fn load(name: &str) -> Result<Self, SceneError> {
+        Self::load_as(name, Precision::Single)
+    }
+
+    /// Loads a scene by name, as [`load`](Self::load) does, with triangles of this precision.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`load`](Self::load), and for f64 also spheres, and triangles that
+    /// [`DTriangle::check`] rejects.
+    pub fn load_as(name: &str, precision: Precision) -> Result<Self, SceneError> {
+        let mut scene = Self::load_named(name, precision)?;
+        if precision == Precision::Single {
+            return Ok(scene);
+        }
+        if let Ok(generated) = scene.triangles() {
+            let triangles = generated.iter().map(|triangle| DTriangle(triangle.corners()));
+            let triangles = Primitives::Doubles(triangles.collect());
+            scene = Self::new(&scene.name, scene.kind, triangles);
+        }
+        DTriangle::check(scene.doubles()?).map_err(|error| SceneError::new(&scene.name, error))?;
+        Ok(scene)
+    }
+
+    fn load_named(name: &str, precision: Precision) -> Result<Self, SceneError> {
         match Subset::parse(name) {
             // A generated scene has any number of objects, so its count is not a subset.
             Some((id, Subset::Spaced(objects))) if stiff::by_id(id).is_some() => {
                 Self::generated(id, name, objects)
             }
-            Some((whole, subset)) => Self::load_whole(whole)?.subset(subset, &name[whole.len()..]),
-            None => Self::load_whole(name),
+            Some((whole, subset)) => {
+                Self::load_whole(whole, precision)?.subset(subset, &name[whole.len()..])
+            }
+            None => Self::load_whole(name, precision),
         }
     }
 
-    fn load_whole(name: &str) -> Result<Self, SceneError> {
+    fn load_whole(name: &str, precision: Precision) -> Result<Self, SceneError> {
         if let Some(scene) = stand_ins::STAND_INS.iter().find(|scene| scene.name == name) {
             let triangles = Primitives::Triangles((scene.triangles)());
             return Ok(Self::new(name, SceneKind::StandIn, triangles));
@@ -120,15 +159,22 @@ impl Scene {
         // A single word without an extension was meant as a scene's name, so that the error lists
         // the names. Anything else is a path, and the reader reports its fault.
         if path.extension().is_none() && path.components().count() == 1 && !path.exists() {
-            let meant = did_you_mean(name);
+            let meant = did_you_mean(name, known_names().map(Into::into));
             return Err(SceneError::new(name, format!("no such scene{meant}; {}", known_scenes())));
         }
-        let mesh = load::load(&path).map_err(|error| SceneError::new(name, error))?;
+        let read = match precision {
+            Precision::Single => Self::read::<Triangle>(&path),
+            Precision::Double => Self::read::<DTriangle>(&path),
+        };
+        read.map_err(|error| SceneError::new(name, error))
+    }
+
+    fn read<T: FromFile>(path: &Path) -> Result<Self, MeshError> {
+        let mesh = load::load_as::<T>(path)?;
         let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
         // The remark names the scene, because an experiment loads many.
         let remark = mesh.remark().map(|remark| format!("scene {stem}: {remark}"));
-        let triangles = Primitives::Triangles(mesh.triangles);
-        Ok(Self { remark, ..Self::new(&stem, SceneKind::File, triangles) })
+        Ok(Self { remark, ..Self::new(&stem, SceneKind::File, T::primitives(mesh.triangles)) })
     }
 
     /// Generates a scene of `objects` objects, or of nearly as many where the generator cannot make
@@ -152,11 +198,10 @@ impl Scene {
     /// Returns the same scene with the boxes of its triangles in a frame, if there is one.
     #[must_use]
     pub fn in_frame(self, frame: Option<Frame>) -> Self {
-        match (&self.primitives, &frame) {
-            (Primitives::Triangles(triangles), Some(turned)) => {
-                Self { boxes: turned.boxes(triangles), frame, ..self }
-            }
-            _ => self,
+        match &self.primitives {
+            Primitives::Spheres(_) => self,
+            _ if frame.is_none() => self,
+            triangles => Self { boxes: triangles.boxes_in(frame.as_ref()), frame, ..self },
         }
     }
 
@@ -171,7 +216,15 @@ impl Scene {
         Ok(Self { remark: self.remark, ..Self::new(&name, self.kind, primitives) })
     }
 
-    /// Returns the triangles, or an error if the objects are spheres.
+    /// Returns the triangles in f64, or an error if the objects are others.
+    pub fn doubles(&self) -> Result<&[DTriangle], SceneError> {
+        match &self.primitives {
+            Primitives::Doubles(triangles) => Ok(triangles),
+            _ => Err(SceneError::new(&self.name, "spheres; accepted: a scene of triangles")),
+        }
+    }
+
+    /// Returns the triangles in f32, or an error if the objects are others.
     pub fn triangles(&self) -> Result<&[Triangle], SceneError> {
         match &self.primitives {
             Primitives::Triangles(triangles) => Ok(triangles),
@@ -182,6 +235,11 @@ impl Scene {
                 Err(SceneError::new(&self.name, "spheres; accepted: a scene of triangles"))
             }
         }
+    }
+
+    /// Returns whether the objects are triangles, in f32 or f64.
+    pub fn has_triangles(&self) -> bool {
+        !matches!(self.primitives, Primitives::Spheres(_))
     }
 
     /// Returns the direction that is up: z in the stand-ins, and y otherwise, which most modellers
@@ -215,17 +273,6 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
 fn known_names() -> impl Iterator<Item = &'static str> {
     let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
     names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name))
-}
-
-/// Returns the question after the nearest of the known names, as `; did you mean escher?`, or
-/// nothing if none is near.
-fn did_you_mean(name: &str) -> String {
-    const NEAR: f64 = 0.6;
-    let near = |known| (strsim::normalized_damerau_levenshtein(name, known), known);
-    match known_names().map(near).max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((nearness, known)) if nearness >= NEAR => format!("; did you mean {known}?"),
-        _ => String::new(),
-    }
 }
 
 fn known_scenes() -> String {

@@ -35,12 +35,7 @@ impl TreeFileError {
 /// Returns the bytes of the tree file at `path`. If the header is invalid or does not match the
 /// file's length, rejects the file before it reads the rest.
 pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
-    let length = regular(path)?;
-    let mut file = File::open(path).map_err(ReadError::of(path))?;
-    let mut bytes = Vec::new();
-    let header = file.by_ref().take(Header::BYTES as u64).read_to_end(&mut bytes);
-    header.map_err(ReadError::of(path))?;
-    Header::of_file(&bytes, length).map_err(TreeFileError::of(path))?;
+    let (_, mut bytes, file, length) = begin(path)?;
     let after_header = length.saturating_sub(bytes.len() as u64);
     // An intact file may still be larger than the memory, which is an error and no abort.
     bytes
@@ -48,6 +43,22 @@ pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
         .map_err(|_| ReadError::of(path)(io::ErrorKind::OutOfMemory.into()))?;
     file.take(after_header).read_to_end(&mut bytes).map_err(ReadError::of(path))?;
     Ok(bytes)
+}
+
+/// Returns the header of the tree file at `path`. Does not read the rest.
+pub fn header(path: &Path) -> Result<Header, TreeFileError> {
+    Ok(begin(path)?.0)
+}
+
+/// Returns a file's header, which matches its length, and its bytes, the rest, and that length.
+fn begin(path: &Path) -> Result<(Header, Vec<u8>, File, u64), TreeFileError> {
+    let length = regular(path)?;
+    let mut file = File::open(path).map_err(ReadError::of(path))?;
+    let mut bytes = Vec::new();
+    let beginning = file.by_ref().take(Header::BYTES as u64).read_to_end(&mut bytes);
+    beginning.map_err(ReadError::of(path))?;
+    let header = Header::of_file(&bytes, length).map_err(TreeFileError::of(path))?;
+    Ok((header, bytes, file, length))
 }
 
 /// Reads the tree over a scene's objects from the file at `path`, and the file's header. Without a
@@ -68,7 +79,8 @@ pub fn load<'a>(
         let header = file.header().clone();
         let tree = match scene {
             Some(Scene { boxes, primitives, .. }) => {
-                file.for_boxes(boxes)?.tree_over(boxes, Some(primitives), &call_in_turn)?
+                let file = file.for_objects(boxes, Some(primitives))?;
+                file.tree_over(boxes, Some(primitives), &call_in_turn)?
             }
             None => file.tree()?,
         };

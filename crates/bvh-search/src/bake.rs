@@ -314,7 +314,12 @@ impl<'a> Bake<'a> {
         validated?;
         let name = self.method.map_or("best", |(name, _)| name);
         let name = if self.rays.is_some() { format!("{name} for rays") } else { name.into() };
-        let origin = Origin { method: &name, seed: self.seed, work, visits: &visits, objective };
+        let doubles = match self.shapes {
+            Some(Primitives::Doubles(triangles)) => &triangles[..],
+            _ => &[],
+        };
+        let (method, seed, visits) = (&name[..], self.seed, &visits[..]);
+        let origin = Origin { method, seed, work, visits, objective, doubles };
         let boxes = along_file.as_deref().unwrap_or(self.boxes);
         let sections = file::sections(tree, boxes, cost, &origin, &parallel::call_both)?;
         Ok(write(&sections.each_ref().map(|section| &**section)))

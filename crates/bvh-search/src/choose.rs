@@ -216,7 +216,7 @@ impl<'a> Bake<'a> {
     fn combinations(&self, open: &Open, objective: Objective) -> Vec<Combination> {
         let is_triangles = matches!(self.shapes, Some(Primitives::Triangles(_)));
         let has_choices = self.method.is_none() && self.start.is_none() && is_triangles;
-        if !(has_choices && open.budget) {
+        if !(has_choices && open.budget) || self.boxes.is_empty() {
             return Vec::new();
         }
         let mut costs = vec![(objective, open.rays.is_some())];

@@ -16,7 +16,7 @@ use crate::{Bake, Budget, Observer, Stream};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::internal_area;
 use bvh_core::glam::{DMat3, DQuat, DVec3, Vec3};
-use bvh_core::{Aabb, DTriangle, DWideBvh, Frame, InFrame, Triangle};
+use bvh_core::{Aabb, DTriangle, DWideBvh, Frame, InFrame, Primitives, Triangle};
 use rand::RngExt;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -130,8 +130,27 @@ impl Choice {
 }
 
 impl Choice {
-    /// Chooses the frame of triangles in f64: its centre is in their middle.
-    pub(crate) fn of_doubles(
+    /// Chooses the frame of a bake over these shapes: the [best](Self::of) one of triangles, if they
+    /// are free to choose, and one with its centre in their middle of those in f64. `None` for other
+    /// shapes, and for triangles in f32 along the file's axes.
+    pub fn of_shapes(
+        shapes: &Primitives,
+        frames: Frames,
+        budget: Budget,
+        observer: &dyn Observer,
+    ) -> Option<Self> {
+        match shapes {
+            Primitives::Triangles(triangles) if frames == Frames::Auto => {
+                Some(Self::of(triangles, budget, observer))
+            }
+            Primitives::Doubles(triangles) => {
+                Some(Self::of_doubles(triangles, frames, budget, observer))
+            }
+            _ => None,
+        }
+    }
+
+    fn of_doubles(
         triangles: &[DTriangle],
         frames: Frames,
         budget: Budget,

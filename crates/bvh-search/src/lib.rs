@@ -40,7 +40,7 @@ pub use frames::{Choice, Frames};
 pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
-pub use owned::{Anywhere, FramedExport, Objects, Options, OwnedTree};
+pub use owned::{Anywhere, Objects, Options, OwnedTree};
 pub use rays::ray_density;
 pub use reason::{More, Reason, Tried};
 #[cfg(feature = "serde")]

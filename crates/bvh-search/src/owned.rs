@@ -7,7 +7,7 @@ use crate::{
 };
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
-use bvh_core::export::Target;
+use bvh_core::export::{ExportError, Target};
 use bvh_core::file::{FileError, TreeFile};
 use bvh_core::{
     Aabb, Bvh, DTriangle, Frame, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle,
@@ -53,14 +53,6 @@ impl Default for Options<'_> {
     }
 }
 
-/// The reason why a tree is not exported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the boxes of the tree lie in a frame, but those of other tracers along the file's axes; \
-     accepted: a tree of a bake with the file's frame"
-)]
-pub struct FramedExport;
-
 /// The tree of a [`Bake`], with its objects.
 #[derive(Clone, Debug)]
 pub struct OwnedTree {
@@ -95,13 +87,8 @@ impl OwnedTree {
         };
         let budget = if is_open { Budget::of_objects(count) } else { options.budget };
         let choice = match &objects {
-            Objects::Shapes(Primitives::Triangles(triangles)) if frame == Frames::Auto => {
-                Some(Choice::of(triangles, budget, observer))
-            }
-            Objects::Shapes(Primitives::Doubles(triangles)) => {
-                Some(Choice::of_doubles(triangles, frame, budget, observer))
-            }
-            _ => None,
+            Objects::Boxes(_) => None,
+            Objects::Shapes(shapes) => Choice::of_shapes(shapes, frame, budget, observer),
         };
         let mut owned = Self::bare(objects, choice.and_then(|choice| choice.frame));
         (owned.references, owned.seed) = (references.unwrap_or(1.0), seed);
@@ -176,7 +163,7 @@ impl OwnedTree {
     /// objects, as [`TreeFile::tree_over`] does.
     pub fn load(objects: Objects, bytes: &[u8]) -> Result<Self, FileError> {
         let mut owned = Self::bare(objects, None);
-        let file = TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
+        let file = TreeFile::open(bytes)?.for_objects(&owned.boxes, owned.shapes.as_ref())?;
         owned.tree = file.tree_over(&owned.boxes, owned.shapes.as_ref(), &parallel::call_both)?;
         if let Some(frame) = owned.tree.frame {
             let shapes = owned.shapes.as_ref().ok_or(FileError::Frame)?;
@@ -213,11 +200,10 @@ impl OwnedTree {
     }
 
     /// Returns the tree as a [file](Target::bytes) for another tracer; of triangles, the greedy tree
-    /// if it is [better](Target::fit_better) there. Rejects a tree in a frame.
-    pub fn export(&self, target: &Target) -> Result<Vec<u8>, FramedExport> {
-        if self.tree.frame.is_some() {
-            return Err(FramedExport);
-        }
+    /// if it is [better](Target::fit_better) there. Rejects trees that the tracer would trace
+    /// [wrongly](Target::check); `divided` says that all queries are for the nearest or any hit.
+    pub fn export(&self, target: &Target, divided: bool) -> Result<Vec<u8>, ExportError> {
+        target.check(&self.tree, self.boxes.len(), divided)?;
         let fitted = match (self.triangles(), muller_fellner::Config::default().build(&self.boxes))
         {
             (Some(triangles), Ok(greedy)) => target.fit_better(&self.tree, &greedy, triangles).tree,

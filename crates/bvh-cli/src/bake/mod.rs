@@ -7,15 +7,15 @@ mod watch;
 
 use crate::Error;
 use crate::answer::{Answer, frame_facts, gain, saved, short, whole};
-use crate::arguments::{input_file, load_scene, output_file, output_or_free};
+use crate::arguments::{input_file, load_scene, output_file, output_or_free, precision_of};
 use crate::export::tracers;
 use crate::interrupt::{hold, is_interrupted};
 use crate::rays::Rays;
 use bvh_core::Aabb;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
-use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
+use bvh_scenes::{Precision, Scene};
 use bvh_search::{
     Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
 };
@@ -29,6 +29,11 @@ use watch::Watch;
 
 /// Search for the best tree of a scene within a budget, and save it.
 #[derive(Args, Clone, Debug)]
+#[command(after_help = "Examples:
+  bvh bake scene.glb                    choose everything, and end when more hardly pays
+  bvh bake scene.glb --budget 1m        search for a minute
+  bvh bake scene.glb --rays frame.npy   for the rays of a frame
+  bvh bake scene.glb --for obvhs        for `bvh export scene.bvh scene.glb --for obvhs`")]
 pub struct BakeArgs {
     /// Name of a scene, or path of a mesh file.
     pub scene: String,
@@ -40,7 +45,7 @@ pub struct BakeArgs {
     pub budget: Option<Effort>,
     /// The file to write. It replaces an existing file when it is complete. Without it, a new file
     /// with the scene's name, in this folder.
-    #[arg(long, value_name = "FILE.bvh")]
+    #[arg(short, long, value_name = "FILE.bvh")]
     pub out: Option<PathBuf>,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -66,6 +71,10 @@ pub struct BakeArgs {
     /// methods than best do. Without it, with --from, those of the tree.
     #[arg(long, value_name = "auto|file", value_parser = frames(), conflicts_with = "from")]
     pub frame: Option<Frames>,
+    /// The numbers of the triangles: `single`, to which the coordinates of the file are rounded, or
+    /// `double`, as they are in the file. With --from, the default is that of the tree.
+    #[arg(long, value_name = "single|double", value_parser = precisions())]
+    pub precision: Option<Precision>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
     /// and with as many references as pay there.
     #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
@@ -110,6 +119,13 @@ fn frames() -> impl TypedValueParser<Value = Frames> {
     })
 }
 
+fn precisions() -> impl TypedValueParser<Value = Precision> {
+    PossibleValuesParser::new(["single", "double"]).map(|precision| match precision.as_str() {
+        "double" => Precision::Double,
+        _ => Precision::Single,
+    })
+}
+
 /// The method that can continue from a given tree and divide objects.
 const BEST: &str = "best";
 
@@ -133,7 +149,7 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     let out = args.out()?;
     output_file("--out", &out, "bvh")?;
     let mut plan = args.plan()?;
-    let scene = load_scene(&args.scene)?;
+    let scene = load_scene(&args.scene, args.precision()?)?;
     if let Some(rays) = &plan.rays {
         rays.check(&scene)?;
     }
@@ -285,6 +301,21 @@ impl BakeArgs {
         })
     }
 
+    /// Returns the numbers of the scene's triangles. Rejects f64 for tracers of f32.
+    pub fn precision(&self) -> Result<Precision, Error> {
+        let precision = match (self.precision, &self.from) {
+            (None, Some(from)) => precision_of(from)?,
+            (given, _) => given.unwrap_or_default(),
+        };
+        match self.tracer {
+            Some(Target { name, .. }) if precision == Precision::Double => {
+                let accepted = "--precision single";
+                Err(Error::Usage(format!("--for {name} in double; accepted: {accepted}")))
+            }
+            _ => Ok(precision),
+        }
+    }
+
     /// Returns what the arguments leave open. The tracers of others have a cost of their own.
     fn open<'a>(&self, anywhere: MadeRays<'a>) -> Open<'a> {
         let is_ours = self.tracer.is_none();
@@ -332,12 +363,14 @@ impl BakeArgs {
             return scene.in_frame(tree.frame);
         }
         let is_free = matches!(plan.method, Method::Best(_)) && self.tracer.is_none();
-        let triangles = match scene.triangles() {
-            Ok(triangles) if is_free && self.frame != Some(Frames::File) => triangles,
-            _ => return scene,
+        let frames = if is_free { self.frame.unwrap_or_default() } else { Frames::File };
+        let budget = plan.budget(scene.boxes.len());
+        let Some(choice) = Choice::of_shapes(&scene.primitives, frames, budget, watch) else {
+            return scene;
         };
-        let choice = Choice::of(triangles, plan.budget(triangles.len()), watch);
-        watch.bar.suspend(|| answer.say(&Reason::Frame(choice).to_string()));
+        if frames == Frames::Auto {
+            watch.bar.suspend(|| answer.say(&Reason::Frame(choice).to_string()));
+        }
         if self.explain && choice.agreeing > 0.0 {
             let percent = 100.0 * choice.agreeing;
             let line = format!("frame: {percent:.0} % of the triangles, by size, share their axes");

@@ -12,7 +12,7 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
 use bvh_scenes::files::{Reserved, WriteError};
 use bvh_scenes::tree_file;
-use bvh_scenes::{Scene, fnv1a};
+use bvh_scenes::{Precision, Scene, fnv1a};
 use bvh_search::Open;
 use serde_json::json;
 use std::fs;
@@ -45,7 +45,11 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
     let out = args.out()?;
     output_file("--out", &out, "bvh")?;
     let plan = args.plan()?;
-    let scene = load_scene(&args.scene)?;
+    if args.precision()? == Precision::Double {
+        let accepted = "--precision single";
+        return Err(Error::Usage(format!("--parts {count} in double; accepted: {accepted}")));
+    }
+    let scene = load_scene(&args.scene, Precision::Single)?;
     let parts = parts(&plan, &scene, count)?;
     if args.list {
         for (number, Part { id, objects, plan }) in (1..).zip(&parts) {

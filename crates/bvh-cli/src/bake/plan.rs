@@ -126,7 +126,7 @@ impl Plan {
         let explain = |reason: &Reason| answer.line("choices", reason.to_string());
         watch.bar.suspend(|| chosen.reasons.iter().for_each(explain));
         let greedy = chosen.greedy.take();
-        let is_traced = scene.triangles().is_ok();
+        let is_traced = scene.has_triangles();
         let tests = greedy.as_ref().filter(|_| is_traced).map(|tree| chosen.tests(tree));
         let tried = chosen.tried.take();
         let is_tried = tried.is_some();

@@ -7,9 +7,9 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::Segment;
 use bvh_core::cost::{internal_area, layout_area};
 use bvh_core::file::TreeFile;
-use bvh_scenes::{Scene, tree_file};
+use bvh_scenes::{Precision, Scene, tree_file};
 use bvh_search::{Anywhere, Budget, Frames, Objects, Options, OwnedTree};
-use glam::Mat3;
+use glam::{DVec3, Mat3};
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -337,4 +337,51 @@ fn an_oblique_scene_is_baked_in_a_frame_that_every_command_and_later_bake_keeps(
     assert!(bvh(at, "report a.bvh turned.obj").contains(" % cheaper"));
     wrong(at, "export a.bvh turned.obj --for=json --out=x.json", &["a.bvh", "--frame file"]);
     wrong(at, &format!("{bake} --from=a.bvh --frame=file --out=d.bvh"), &["--frame", "--from"]);
+}
+
+#[test]
+fn a_bake_in_double_precision_has_the_numbers_of_the_file_in_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut mesh = String::new();
+    for triangle in Scene::load("escher:300").unwrap().triangles().unwrap() {
+        for corner in triangle.0 {
+            let [x, y, z] = (corner.as_dvec3() + DVec3::new(5e5, 5.4e6, 0.1)).to_array();
+            mesh += &format!("v {x} {y} {z}\n");
+        }
+        mesh += "f -3 -2 -1\n";
+    }
+    fs::write(at.join("far.obj"), &mesh).unwrap();
+    fs::write(at.join("moved.obj"), mesh.replacen(".1", ".10000001", 1)).unwrap();
+    let path = at.join("far.obj");
+    let scene = Scene::load_as(path.to_str().unwrap(), Precision::Double).unwrap();
+    for (flags, frame, references) in [
+        ("", Frames::Auto, None),
+        (" --frame=file", Frames::File, None),
+        (" --references=1.3", Frames::Auto, Some(1.3)),
+    ] {
+        let line = format!("far.obj --precision=double --budget=300kwork --seed=5{flags}");
+        let (_, bytes) = bake_twice(at, &line);
+        let budget = Budget { max_work: Some(300_000), ..Budget::UNLIMITED };
+        let options = Options { references, seed: 5, budget, frame, ..Options::default() };
+        let objects = Objects::Shapes(scene.primitives.clone());
+        assert!(bytes == OwnedTree::find(objects, &options, &()).unwrap().save().unwrap());
+        assert!(facts(at, "verify x.bvh far.obj")["saved"].as_f64() > Some(0.0), "{flags}");
+        wrong(at, "verify x.bvh moved.obj", &["x.bvh", "another scene"]);
+        bvh(at, "bake far.obj --from=x.bvh --budget=1kwork --out=y.bvh");
+        bvh(at, "verify y.bvh far.obj");
+    }
+    let kinds = facts(at, "bench x.bvh far.obj --time=1ms");
+    assert!(kinds["kinds"].as_array().unwrap().iter().all(|kind| kind["ratio"].is_number()));
+    bvh(at, "report x.bvh far.obj");
+    bvh(at, "render far.obj --accel=x.bvh --size=40x30 --out=x.png");
+    assert!(number(at, "inspect x.bvh far.obj --rays=default", "tests_per_ray") > 0.0);
+    wrong(at, "export x.bvh far.obj --for=json --out=x.json", &["f64; accepted", "f32"]);
+    let double = "bake far.obj --precision=double --out=z.bvh --budget=0s";
+    for flags in ["--parts=2", "--for=json"] {
+        wrong(at, &format!("{double} {flags}"), &["double", "--precision single"]);
+    }
+    wrong(at, &format!("{double} --from=x.bvh").replace("double", "single"), &["f64", "double"]);
+    wrong(at, "bake spheres75 --precision=double --out=z.bvh", &["spheres75", "triangles"]);
+    wrong(at, &double.replace("double", "half"), &["half", "single", "double"]);
 }

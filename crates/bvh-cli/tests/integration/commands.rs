@@ -89,6 +89,7 @@ orient good.bvh --out=x.obj ! good.bvh
 
 bake sofa LONG ! scene sofa: no such scene; accepted: bijou
 bake esher LONG ! no such scene; did you mean escher?
+bake mash.obj LONG ! scene mash.obj: no such file; did you mean mesh.obj?
 bake no.glb LONG ! error: scene no.glb: no such file
 bake spheres75 LONG --from=cut.bvh ! cut.bvh | cut or extended
 bake spheres75 LONG --from=flipped.bvh ! flipped.bvh | checksum

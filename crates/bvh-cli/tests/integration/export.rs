@@ -5,6 +5,7 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::export::{Layout, Target};
 use bvh_scenes::{Scene, tree_file};
+use std::collections::BTreeSet;
 use std::fs;
 
 #[test]
@@ -23,14 +24,70 @@ fn an_export_is_the_fitted_tree_and_says_how_it_compares() {
         assert_eq!(bytes, target.bytes(&target.fit(&tree), &scene.boxes));
     }
     // A tree for another layout is worth another bake.
-    let hint = "`bvh bake escher:900 --for obvhs`";
     bvh(at, "bake escher:900 --budget=100kwork --cost=layout --out=wide.bvh");
-    for (tree, is_told) in [("x.bvh", false), ("wide.bvh", true)] {
-        let said = bvh(at, &format!("export {tree} escher:900 --for=obvhs --out=x.bin"));
-        assert_eq!(said.contains(hint), is_told, "{said}");
+    for (tree, tracer, is_told) in [
+        ("x.bvh", "three-mesh-bvh", false),
+        ("wide.bvh", "three-mesh-bvh", true),
+        // That tracer takes divided triangles.
+        ("x.bvh", "obvhs", true),
+    ] {
+        let said = bvh(at, &format!("export {tree} escher:900 --for={tracer} --out=x.bin"));
+        let hint = format!("`bvh bake escher:900 --for {tracer}`");
+        assert_eq!(said.contains(&hint), is_told, "{said}");
     }
     let json = facts(at, "export x.bvh escher:900 --for=obvhs --out=x.bin");
     assert!(json["gain_inside"].is_f64() && json["is_searched"] == true, "{json:?}");
+}
+
+#[test]
+fn an_export_says_what_was_measured_over_the_own_trees_of_each_layout_of_the_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    bvh(at, "bake escher:900 --budget=1kwork --out=x.bvh");
+    let results = concat!(env!("CARGO_MANIFEST_DIR"), "/../../results/interop/timing_tracers.csv");
+    let results = fs::read_to_string(results).unwrap().replace('"', "").replace(", ", "; ");
+    let [header, rows @ ..] =
+        &results.lines().map(|line| line.split(',').collect()).collect::<Vec<Vec<_>>>()[..]
+    else {
+        panic!("no rows")
+    };
+    let column = |name: &str| header.iter().position(|column| *column == name).unwrap();
+    let [tracer, scene, rays, tree, over, ratio] =
+        ["tracer", "scene", "rays", "tree", "over", "ratio_median"].map(column);
+    for target in Target::ALL {
+        let file = if target.layout == Layout::Json { "x.json" } else { "x.bin" };
+        let said = bvh(at, &format!("export x.bvh escher:900 --for={} --out={file}", target.name));
+        let layouts: BTreeSet<&str> = rows
+            .iter()
+            .map(|row| row[tracer])
+            .filter(|layout| layout.split(' ').next() == Some(target.name))
+            .collect();
+        assert_eq!(layouts.is_empty(), target == Target::PLAIN);
+        assert_eq!(said.matches("measured in ").count(), layouts.len(), "{said}");
+        for layout in layouts {
+            let made = if target.references > 1.0 { "divided" } else { "searched" };
+            let range = |kind: &str| {
+                let found = |row: &&Vec<&str>| {
+                    [row[tracer], row[rays], row[tree], row[over]] == [layout, kind, made, "best"]
+                        && !row[scene].contains(" and ")
+                };
+                let ratios: Vec<f64> =
+                    rows.iter().filter(found).map(|row| row[ratio].parse().unwrap()).collect();
+                assert_eq!(ratios.len(), 7, "{layout}, {kind}");
+                let [least, most] = [f64::min, f64::max]
+                    .map(|pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).unwrap());
+                format!("{least:.2} to {most:.2}")
+            };
+            let line = said
+                .lines()
+                .find(|line| line.starts_with(&format!("measured in {layout} over")))
+                .unwrap();
+            assert!(
+                line.contains(&range("primary")) && line.contains(&range("incoherent")),
+                "{line}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -56,7 +113,7 @@ fn a_tree_that_divides_triangles_is_for_tracers_that_count_hits_only_if_one_says
         let export = format!("export x.bvh escher:900 --for={} --out={file}", target.name);
         if target.references == 1.0 {
             let name = format!("escher:900 --for {}`", target.name);
-            wrong(at, &export, &["x.bvh", "to 900 triangles", &name, "--divided"]);
+            wrong(at, &export, &["x.bvh", "to 900 objects", &name, "--divided"]);
         }
         let divided = if target.references == 1.0 { " --divided" } else { "" };
         bvh(at, &format!("{export}{divided}"));

@@ -30,5 +30,5 @@ pub const SHADER: &str = include_str!("../../shaders/trace.wgsl");
 
 pub use better::Better;
 pub use first_count::FirstCountNode;
-pub use target::{Layout, Target, UnknownTarget};
+pub use target::{ExportError, Layout, Target, UnknownTarget};
 pub use three_mesh::ThreeMeshNode;

@@ -34,6 +34,25 @@ pub struct UnknownTarget {
     pub name: String,
 }
 
+/// The reason why a tree is not exported.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ExportError {
+    /// The boxes lie in a [frame](crate::Frame), but those of other tracers along the file's axes.
+    #[error(
+        "the boxes of the tree lie in a frame, but those of other tracers along the file's axes; \
+         accepted: a tree of a bake in single precision with the file's frame"
+    )]
+    Framed,
+    /// The tree divides objects, which a query for all hits would find more than once there.
+    #[error(
+        "the tree has {references} references to {objects} objects, and a query of {tracer} for all \
+         hits would find the divided ones more than once; accepted: a tree that divides none, or \
+         your word (`divided`) that your queries are for the nearest or any hit"
+    )]
+    #[allow(missing_docs)] // The message explains the fields.
+    Divided { tracer: &'static str, references: usize, objects: usize },
+}
+
 /// A layout of binary nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -122,6 +141,18 @@ impl Target {
     pub fn named(name: &str) -> Result<Self, UnknownTarget> {
         let target = Self::ALL.into_iter().find(|target| target.name == name);
         target.ok_or_else(|| UnknownTarget { name: name.into() })
+    }
+
+    /// Rejects a tree over so many objects that this tracer would trace wrongly: one in a frame, and,
+    /// unless all queries are for the nearest or any hit (`divided`), one that divides objects where
+    /// [`references`](Self::references) permits none. O(1).
+    pub fn check(&self, tree: &Bvh, objects: usize, divided: bool) -> Result<(), ExportError> {
+        let (tracer, references) = (self.name, tree.prim_ids.len());
+        match references > objects && self.references == 1.0 && !divided {
+            _ if tree.frame.is_some() => Err(ExportError::Framed),
+            true => Err(ExportError::Divided { tracer, references, objects }),
+            false => Ok(()),
+        }
     }
 
     /// Returns the tree for this tracer: binary, with the leaves that cost least there, no leaf too

@@ -60,6 +60,9 @@ pub enum FileError {
         /// The checksum in the file.
         expected: u32,
     },
+    /// The tree is over triangles in f64, and the objects are others.
+    #[error("the tree is over triangles in f64; accepted: the same triangles in double precision")]
+    Double,
     /// The tree lies in a frame, and boxes along the file's axes cannot validate it.
     #[error("the boxes of the tree lie in a frame: save it together with its triangles")]
     Frame,

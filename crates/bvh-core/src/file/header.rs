@@ -24,7 +24,7 @@ pub struct Header {
     pub seed: u64,
     /// The work of the search, in nodes made or visited.
     pub work: u64,
-    /// The [checksum](super::boxes_checksum) of the boxes that the tree was built over.
+    /// The checksum of the objects: of their [boxes](super::boxes_checksum), and of corners in f64.
     pub scene: u32,
     /// The root's box; [`Aabb::EMPTY`] if there are no objects.
     pub bounds: Aabb,
@@ -35,6 +35,8 @@ pub struct Header {
     pub has_visits: bool,
     /// True if the boxes lie in a frame; see [`TreeFile::frame`](super::TreeFile::frame).
     pub has_frame: bool,
+    /// True if the objects are triangles in f64, which [`scene`](Self::scene) identifies.
+    pub is_double: bool,
 }
 
 impl Header {
@@ -49,6 +51,8 @@ impl Header {
     const VISITS: u32 = 1;
     /// The flag of a file that has a frame.
     const FRAME: u32 = 2;
+    /// The flag of a file for triangles in f64.
+    const DOUBLE: u32 = 4;
     /// A number whose stored bytes identify the byte order of the file.
     pub(super) const ENDIANNESS: u32 = 0x0102_0304;
     /// The bytes of the root's box. They equal the box in the first node.
@@ -115,7 +119,8 @@ impl Header {
             method,
             references: self.references as u64,
             flags: if self.has_visits { Self::VISITS } else { 0 }
-                | if self.has_frame { Self::FRAME } else { 0 },
+                | if self.has_frame { Self::FRAME } else { 0 }
+                | if self.is_double { Self::DOUBLE } else { 0 },
             reserved: [0; 2],
             checksum: 0,
         };
@@ -158,7 +163,7 @@ impl Header {
         if nodes > 2 * references {
             return Err(FileError::Field("nodes"));
         }
-        let has_other_flags = flags & !(Self::VISITS | Self::FRAME) != 0;
+        let has_other_flags = flags & !(Self::VISITS | Self::FRAME | Self::DOUBLE) != 0;
         let is_padded = stored.reserved == [0; 2] && padding.iter().all(|&byte| byte == 0);
         if has_other_flags || !is_padded {
             return Err(FileError::Field("padding"));
@@ -176,6 +181,7 @@ impl Header {
             method: method.to_owned(),
             has_visits: flags & Self::VISITS != 0,
             has_frame: flags & Self::FRAME != 0,
+            is_double: flags & Self::DOUBLE != 0,
         })
     }
 }

@@ -25,7 +25,7 @@
 //! | 8..12 | `u32` | version: 4 |
 //! | 12..16 | `u32` | endianness mark, 0x01020304: the bytes `04 03 02 01` |
 //! | 16..20 | `u32` | objective: 0 internal area, 1 Goldsmith–Salmon, 2 surface area heuristic, 3 wide layout |
-//! | 20..24 | `u32` | checksum of the scene's boxes, each min x, y, z, max x, y, z as `f32`, 0 for −0 |
+//! | 20..24 | `u32` | checksum of the scene: of the boxes, each min x, y, z, max x, y, z as `f32`, then of triangles in f64, each nine `f64`; 0 for −0 |
 //! | 24..32 | `u64` | number of nodes |
 //! | 32..40 | `u64` | number of objects |
 //! | 40..48 | `u64` | seed of the search |
@@ -36,7 +36,7 @@
 //! | 80..104 | `f32[6]` | the root's box, min then max; min +∞ and max −∞ without objects |
 //! | 104..168 | `u8[64]` | name of the method, UTF-8, padded with zeros |
 //! | 168..176 | `u64` | number of references, the object ids in all leaves |
-//! | 176..180 | `u32` | 1 if there are visits, otherwise 0; 2 more if there is a frame |
+//! | 176..180 | `u32` | 1 if there are visits, otherwise 0; 2 more if there is a frame; 4 more if the objects are triangles in f64 |
 //! | 180..188 | | zeros |
 //! | 188..192 | `u32` | checksum of the file: of the bytes from 192 to the end, then of bytes 0..188 |
 //! | 192.. | | the nodes, 32 bytes each, then a `u32` object id per reference, then the visits if there are any, an `f32` per node, then the frame if there is one, `f64[12]` |
@@ -53,7 +53,9 @@
 //! visits than its parent.
 //!
 //! The [frame](crate::Frame) is its rotation, row by row, and its centre. The boxes of all nodes lie
-//! in it; the checksum of the scene is always that of boxes along the file's axes.
+//! in it; the checksum of the scene is always that of boxes along the file's axes. Boxes in `f32` do
+//! not tell triangles in f64 apart, so that the checksum is of their corners, too. Files without the
+//! flag 4 may also be for such triangles, which only their boxes then identify.
 //!
 //! Node 0 is the root. Siblings are adjacent and come after their parent. Every object id occurs
 //! once, or more often if its object is divided among leaves.
@@ -79,10 +81,10 @@ pub use header::Header;
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
 use crate::validate::{Leaves, check_nesting, check_structure, validate_parts};
-use crate::{Aabb, Bvh, BvhView, Frame, InvalidBvh, Node, Primitives, validate};
+use crate::{Aabb, Bvh, BvhView, DTriangle, Frame, InvalidBvh, Node, Primitives, validate};
 use bytemuck::Pod;
 use crc32fast::Hasher;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::borrow::Cow;
 
 const _: () = assert!(cfg!(target_endian = "little"), "tree files have the bytes of memory");
@@ -104,6 +106,8 @@ pub struct Origin<'a> {
     /// [`WideBvh::for_rays`](crate::WideBvh::for_rays). Empty if the tree was not searched for
     /// rays.
     pub visits: &'a [f32],
+    /// The objects if they are triangles in f64; otherwise empty.
+    pub doubles: &'a [DTriangle],
 }
 
 /// Returns the file of a tree over `boxes`, in [this format](self). Rejects a tree that is not
@@ -134,7 +138,7 @@ pub fn sections<'a>(
     origin: &Origin<'a>,
     both: CallBoth,
 ) -> Result<[Cow<'a, [u8]>; 5], FileError> {
-    let Origin { method, seed, work, objective, visits } = *origin;
+    let Origin { method, seed, work, objective, visits, doubles } = *origin;
     let nodes = bytemuck::cast_slice(&tree.nodes);
     let prim_ids = bytemuck::cast_slice(&tree.prim_ids);
     let visit_bytes = bytemuck::cast_slice(visits);
@@ -147,7 +151,7 @@ pub fn sections<'a>(
             if !visits.is_empty() {
                 checked = check_visits(&tree.nodes, visits);
             }
-            scene = boxes_checksum(boxes);
+            scene = scene_checksum(boxes, doubles);
         },
         &mut || {
             for section in [nodes, prim_ids, visit_bytes, &frame] {
@@ -169,6 +173,7 @@ pub fn sections<'a>(
         method: method.into(),
         has_visits: !visits.is_empty(),
         has_frame: tree.frame.is_some(),
+        is_double: !doubles.is_empty(),
     };
     let mut header = header.encode()?;
     hasher.update(&header[..Header::CHECKSUM.start]);
@@ -207,17 +212,28 @@ pub fn load(bytes: &[u8], boxes: &[Aabb]) -> Result<Bvh, FileError> {
 /// Returns the checksum that identifies a scene in a tree file: the CRC-32 of min x, y, z, max x,
 /// y, z of each box, as little-endian `f32`, with 0 for −0. O(n).
 pub fn boxes_checksum(boxes: &[Aabb]) -> u32 {
+    scene_checksum(boxes, &[])
+}
+
+/// Returns the checksum of the boxes and then of triangles in f64, their coordinates as
+/// little-endian `f64`.
+fn scene_checksum(boxes: &[Aabb], doubles: &[DTriangle]) -> u32 {
     let mut hasher = Hasher::new();
-    let mut piece = [Aabb::EMPTY; 256];
-    for boxes in boxes.chunks(piece.len()) {
-        for (without_sign, given) in piece.iter_mut().zip(boxes) {
-            // Mirrored objects have −0 where others have 0; −0 + 0 is 0.
-            let zero = Vec3::ZERO;
-            *without_sign = Aabb { min: given.min + zero, max: given.max + zero };
-        }
-        hasher.update(bytemuck::cast_slice(&piece[..boxes.len()]));
-    }
+    // Mirrored objects have −0 where others have 0; −0 + 0 is 0.
+    let zero = Vec3::ZERO;
+    update(&mut hasher, boxes, |b| Aabb { min: b.min + zero, max: b.max + zero });
+    update(&mut hasher, doubles, |t| DTriangle(t.0.map(|corner| corner + DVec3::ZERO)));
     hasher.finalize()
+}
+
+fn update<T: Pod>(hasher: &mut Hasher, items: &[T], without_sign: impl Fn(&T) -> T) {
+    let mut piece = [T::zeroed(); 256];
+    for items in items.chunks(piece.len()) {
+        for (to, item) in piece.iter_mut().zip(items) {
+            *to = without_sign(item);
+        }
+        hasher.update(bytemuck::cast_slice(&piece[..items.len()]));
+    }
 }
 
 /// A tree file of the correct length and checksum. The tree is checked when it is requested.
@@ -274,14 +290,29 @@ impl<'a> TreeFile<'a> {
         &self.header
     }
 
-    /// Rejects all boxes except the boxes that the tree was saved for, along the file's axes.
-    /// O(objects).
+    /// Rejects all boxes except the boxes that the tree was saved for, along the file's axes, and
+    /// trees over triangles in f64. O(objects).
     pub fn for_boxes(self, boxes: &[Aabb]) -> Result<Self, FileError> {
+        self.for_objects(boxes, None)
+    }
+
+    /// Rejects all objects except those that the tree was saved for: by their boxes, along the
+    /// file's axes, and by the corners of `objects` if they are triangles in f64. O(objects).
+    pub fn for_objects(
+        self,
+        boxes: &[Aabb],
+        objects: Option<&Primitives>,
+    ) -> Result<Self, FileError> {
+        let doubles: &[DTriangle] = match objects {
+            _ if !self.header.is_double => &[],
+            Some(Primitives::Doubles(triangles)) => triangles,
+            _ => return Err(FileError::Double),
+        };
         let objects = self.header.objects;
         if boxes.len() != objects {
             return Err(FileError::ObjectCount { found: boxes.len(), expected: objects });
         }
-        let scene = boxes_checksum(boxes);
+        let scene = scene_checksum(boxes, doubles);
         if scene != self.header.scene {
             return Err(FileError::OtherScene { found: scene, expected: self.header.scene });
         }

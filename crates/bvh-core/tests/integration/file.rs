@@ -4,12 +4,12 @@ use crate::support::layouts::{divided, framed};
 use crate::support::{Random, SHAPES, boxes, grid_box, rays, soup, tree};
 use bvh_core::cost::{Objective, SahConstants, call_in_turn};
 use bvh_core::file::{FileError, Header, Origin, TreeFile, boxes_checksum, load, save, sections};
-use bvh_core::{Aabb, Bvh, InvalidBvh, Primitives, nearest_hit_by};
+use bvh_core::{Aabb, Bvh, DTriangle, InvalidBvh, Primitives, nearest_hit_by};
 use glam::Vec3;
 
 fn origin() -> Origin<'static> {
     let objective = Objective::Sah(SahConstants::new(1.5, 0.25).unwrap());
-    Origin { method: "best", seed: 7, work: 1 << 40, objective, visits: &[] }
+    Origin { method: "best", seed: 7, work: 1 << 40, objective, visits: &[], doubles: &[] }
 }
 
 /// Makes a tree with many children per node, and several objects per leaf.
@@ -69,6 +69,7 @@ fn a_saved_tree_can_be_loaded_and_viewed() {
             method: "best".into(),
             has_visits: false,
             has_frame: false,
+            is_double: false,
         };
         assert_eq!(file.header(), &header);
         assert_eq!(file.visits(), Ok(None));
@@ -201,6 +202,38 @@ fn a_tree_is_for_all_boxes_that_equal_those_it_was_built_over() {
     let bytes = save(&tree, &mirrored, &origin()).unwrap();
     assert_eq!(load(&bytes, &boxes), Ok(tree));
     assert_eq!(boxes_checksum(&mirrored), boxes_checksum(&boxes));
+}
+
+#[test]
+fn a_tree_over_triangles_in_f64_is_for_no_others_in_the_same_boxes() {
+    let scene = |z: f64| {
+        let corners = |x: f64| DTriangle::from([[x, 0.0, z], [x + 1.0, 0.0, 5.1], [x, 1.0, 5.3]]);
+        Primitives::Doubles(vec![corners(0.0), corners(2.1)])
+    };
+    let (ours, others) = (scene(5.2), scene(5.2 + 1e-9));
+    let boxes = ours.boxes();
+    assert_eq!(others.boxes(), boxes);
+    let tree = tree(&boxes, SHAPES[0], &mut Random(3));
+    let Primitives::Doubles(doubles) = &ours else { unreachable!() };
+    let bytes = save(&tree, &boxes, &Origin { doubles, ..origin() }).unwrap();
+    let file = TreeFile::open(&bytes).unwrap();
+    let opened = |objects: Option<&Primitives>| file.clone().for_objects(&boxes, objects).map(drop);
+    assert!(file.header().is_double);
+    assert_eq!(opened(Some(&ours)), Ok(()));
+    assert!(matches!(opened(Some(&others)), Err(FileError::OtherScene { .. })));
+    assert_eq!(opened(None), Err(FileError::Double));
+    let single = Primitives::Triangles(Vec::new());
+    assert_eq!(opened(Some(&single)), Err(FileError::Double));
+    // In Python, as below, and then struct.pack("<18d", …) of the corners.
+    let corners = bytemuck::cast_slice(doubles);
+    let checksum = crc32fast::hash(&[bytemuck::cast_slice(&boxes), corners].concat());
+    assert_eq!(file.header().scene, checksum);
+    // Files of earlier programs identify the boxes only.
+    let older = save(&tree, &boxes, &origin()).unwrap();
+    let older = TreeFile::open(&older).unwrap();
+    assert!(
+        older.clone().for_objects(&boxes, Some(&ours)).is_ok() && older.for_boxes(&boxes).is_ok()
+    );
 }
 
 #[test]

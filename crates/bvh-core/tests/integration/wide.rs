@@ -7,8 +7,8 @@ use crate::support::{
     scaled, soup, tree,
 };
 use bvh_core::{
-    Aabb, Bvh, Coherence, Hit, InFrame, Node, PreparedRay, Ray, RefitError, TestCounts, Triangle,
-    WideBvh, any_hit, nearest_hit,
+    Aabb, Bvh, Coherence, Hit, InFrame, Node, Orientation, PreparedRay, Ray, RefitError, Select,
+    TestCounts, Triangle, WideBvh, any_hit, nearest_hit,
 };
 use glam::{DMat3, DVec3, Vec3};
 
@@ -437,11 +437,28 @@ fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
             Some(Hit { t: triangle.intersect(&prepared, ray.t_max())?, object })
         };
         let all: Vec<Hit> = (0..).zip(&triangles).filter_map(hit).collect();
+        let first = |a: Hit, b: Hit| if b.precedes(&a) { b } else { a };
         let kept = all.iter().copied().filter(|hit| hit.object % 3 > 0);
-        let nearest = kept.reduce(|a, b| if b.precedes(&a) { b } else { a });
+        let nearest = kept.reduce(first);
+        let excluded = all.first().map_or([7, 8], |hit| [7, hit.object]);
+        let sides = [Orientation::Any, Orientation::Exiting, Orientation::Entering];
+        let selected = sides.map(|orientation| {
+            let kept = all.iter().copied().filter(|hit| {
+                let [a, b, c] = triangles[hit.object as usize].0.map(Vec3::as_dvec3);
+                let along = (b - a).cross(c - a).dot(ray.direction().as_dvec3());
+                let counts = [true, along > 0.0, along < 0.0][orientation as usize];
+                counts && !excluded.contains(&hit.object)
+            });
+            (Select { orientation, exclude: &excluded }, kept.reduce(first))
+        });
         for (_, layout) in traced.iter().flat_map(|traced| &traced.layouts) {
             assert_eq!(layout.nearest_hit_where(&ray, |hit| hit.object % 3 > 0), nearest);
             assert_eq!(layout.any_hit_where(&ray, |hit| hit.object % 3 > 0), nearest.is_some());
+            for (select, nearest) in &selected {
+                let filter = || select.filter(&ray, &triangles);
+                assert_eq!(layout.nearest_hit_where(&ray, filter()), *nearest);
+                assert_eq!(layout.any_hit_where(&ray, filter()), nearest.is_some());
+            }
             let mut seen = Vec::new();
             let sees = |hit| {
                 seen.push(hit);

@@ -123,9 +123,11 @@ class Tree:
 
         >>> square.save(folder.name + "/square.bvh")
         """
-    def export(self, tracer: str) -> bytes:
+    def export(self, tracer: str, *, divided: bool = False) -> bytes:
         """Returns the file of `bvh export` for the tracer of another library, by its name there
-        (docs/INTEROP.md).
+        (docs/INTEROP.md). A query for all hits of three-mesh-bvh, of the crate bvh and of a reader of
+        json finds a divided triangle more than once: `divided=True` says that yours are for the
+        nearest or any hit. Otherwise such a tree is rejected.
 
         >>> import json
         >>> json.loads(square.export("json"))["nodes"]
@@ -213,8 +215,7 @@ class Tracer:
     count as 0 below 2^-150. In other tracers, rays and points are
     rounded to `float32`, and `t_min` and `t_max` inwards.
 
-    `nearest` and `any` choose which triangles count, in trees with `precision="double"`: those with
-    the `orientation` `"exiting"`, which the ray meets along their normal as where it leaves a solid,
+    `nearest` and `any` choose which triangles count: those with the `orientation` `"exiting"`, which the ray meets along their normal as where it leaves a solid,
     `"entering"`, against it, or `"any"`, and none of the indices `exclude`. That is one index,
     an array `(m,)` or `(m, k)` of some for each ray; -1 excludes nothing.
 
@@ -314,7 +315,8 @@ class Tracer:
         `by="winding"` counts how often the triangles wind round the point: right for meshes that
         have holes or overlap themselves, if the corners of all triangles run in the same direction.
         It is exact for watertight meshes, and otherwise the generalised winding number of all
-        triangles, at a hundred times the cost. `by="parity"` counts the crossings along one
+        triangles, at a hundred times the cost, and near an open terrain, where it is nearly one half
+        everywhere, at the cost of most triangles. `by="parity"` counts the crossings along one
         direction: right for watertight meshes that do not overlap themselves, in whatever direction
         their corners run. `by="auto"` is parity for watertight meshes with corners in both
         directions, and otherwise winding.

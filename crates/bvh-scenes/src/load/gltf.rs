@@ -10,12 +10,11 @@ mod document;
 mod nodes;
 mod orient;
 
-use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Rounding, counted};
+use super::mesh::{Fault, FromFile, MOST_TRIANGLES, Mesh, Rounding, counted};
 use accessors::{F32, I8, I16, U8, U16, U32};
 use buffers::Buffers;
-use bvh_core::Triangle;
-use document::{Document, Primitive, document, is_covered};
-use glam::{DMat4, DVec3, Vec3};
+use document::{DECOMPRESS, Document, Primitive, document, is_covered};
+use glam::{DMat4, DVec3};
 use nodes::places;
 pub(super) use orient::orient;
 use std::collections::BTreeMap;
@@ -29,10 +28,10 @@ const MOST_BYTES: u64 = 48 * MOST_TRIANGLES as u64;
 const MOST_ITEMS: u64 = 6 * MOST_TRIANGLES as u64;
 
 /// The meshes of a file, each once, and their places.
-struct Parts {
+struct Parts<T> {
     /// Triangles in the mesh's own coordinates, by the mesh's number in the file. Contains only
     /// meshes with a place and at least one triangle.
-    meshes: BTreeMap<usize, Vec<Triangle>>,
+    meshes: BTreeMap<usize, Vec<T>>,
     /// The places of the meshes, in the order of the file's nodes, except those in which no triangle
     /// has an area.
     places: Vec<Placed>,
@@ -53,10 +52,10 @@ pub(super) struct Placed {
 
 /// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to from the folder
 /// of `path`. Returns the meshes at their places.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
+pub fn parse<T: FromFile>(bytes: &[u8], path: &Path) -> Result<Mesh<T>, Fault> {
     let (document, chunk) = document(bytes)?;
-    let Parts { mut meshes, places, mut remarks } = read(&document, chunk, path)?;
-    let mut rounding = Rounding::default();
+    let Parts { mut meshes, places, mut remarks } = read::<T>(&document, chunk, path)?;
+    let mut rounding = Rounding::<T>::default();
     // A file of a few kilobytes can place one mesh any number of times.
     let total = places.iter().map(|place| meshes[&place.mesh].len()).sum();
     check_total(total).map_err(Fault::of_file)?;
@@ -65,16 +64,15 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
         places.iter().map(|place| (place.mesh, place.node)).collect();
     for Placed { node, mesh, transform } in places {
         for triangle in &meshes[&mesh] {
-            let moved = triangle.0.map(|corner| {
-                let exact = transform.transform_point3(corner.into());
-                Vec3::from(exact.to_array().map(|number| rounding.round(number)))
-            });
+            let moved = triangle
+                .corners()
+                .map(|corner| transform.transform_point3(corner).map(|x| rounding.round(x)));
             if let Some(far) = moved.iter().find(|corner| !corner.is_finite()) {
                 let message =
                     format!("a vertex of meshes[{mesh}] at {far}; expected finite numbers");
                 return Err(Fault::of(&format!("nodes[{node}]"), message));
             }
-            triangles.push(Triangle(moved));
+            triangles.push(T::of(moved));
         }
         // Otherwise a file of meshes with one place each would take twice its memory.
         if last_nodes[&mesh] == node {
@@ -85,7 +83,11 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     Ok(Mesh::new(triangles, remarks))
 }
 
-fn read(document: &Document, chunk: Option<&[u8]>, path: &Path) -> Result<Parts, Fault> {
+fn read<T: FromFile>(
+    document: &Document,
+    chunk: Option<&[u8]>,
+    path: &Path,
+) -> Result<Parts<T>, Fault> {
     let buffers = Buffers::new(document, path, chunk);
     let mut loader = Loader { buffers, total: 0, left_out: BTreeMap::new() };
     let mut places = places(document)?;
@@ -172,21 +174,30 @@ impl Loader<'_> {
         *self.left_out.entry(part).or_default() += 1;
     }
 
-    fn add(&mut self, primitive: &Primitive, triangles: &mut Vec<Triangle>) -> Result<(), String> {
-        let mode = primitive.mode;
+    fn add<T: FromFile>(
+        &mut self,
+        primitive: &Primitive,
+        triangles: &mut Vec<T>,
+    ) -> Result<(), String> {
+        let mode = primitive.mode.unwrap_or(4);
         if mode > 6 {
             return Err(format!("mode {mode}; expected 0 to 6"));
         }
         let points = match primitive.attributes.get("POSITION").filter(|_| mode >= 4) {
-            Some(&accessor) => self.buffers.accessor::<3>(accessor, &POSITIONS)?,
+            Some(&accessor) => {
+                self.buffers.accessor::<3>(accessor, &POSITIONS).map_err(|message| {
+                    let is_draco = primitive.extensions.contains_key("KHR_draco_mesh_compression");
+                    if is_draco { format!("{message}{DECOMPRESS}") } else { message }
+                })?
+            }
             None => Vec::new(),
         };
         if points.is_empty() {
             self.leave_out(WITHOUT_TRIANGLES);
             return Ok(());
         }
-        let points: Vec<Vec3> =
-            points.into_iter().map(|point| DVec3::from(point).as_vec3()).collect();
+        let points: Vec<DVec3> =
+            points.into_iter().map(|point| DVec3::from(point).map(T::round)).collect();
         let indices: Vec<usize> = match primitive.indices {
             None => (0..points.len()).collect(),
             Some(accessor) => {
@@ -222,7 +233,7 @@ impl Loader<'_> {
                 5 => [i, i + 1 + i % 2, i + 2 - i % 2],
                 _ => [0, i + 1, i + 2],
             };
-            Triangle(corners.map(|corner| points[indices[corner]]))
+            T::of(corners.map(|corner| points[indices[corner]]))
         }));
         Ok(())
     }

@@ -5,13 +5,14 @@ mod gltf;
 pub mod mesh;
 mod obj;
 mod orient;
+mod other;
 mod ply;
 mod polygon;
 mod stl;
 mod text;
 
 use crate::files::{ReadError, read};
-use mesh::{Fault, Mesh};
+use mesh::{Fault, FromFile, Mesh};
 pub use orient::{Find, Oriented, orient};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -61,7 +62,8 @@ impl Format {
         if bytes.starts_with(b"glTF") || text.starts_with(b"{") {
             return Self::Gltf;
         }
-        if let [b'p', b'l', b'y', after, ..] = unmarked
+        if let [word @ .., after] = &unmarked[..unmarked.len().min(4)]
+            && word.eq_ignore_ascii_case(b"ply")
             && after.is_ascii_whitespace()
         {
             return Self::Ply;
@@ -88,12 +90,21 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
 /// A glTF file may refer to files in its folder and below. Takes O(bytes) time, and a few hundred
 /// bytes of memory per triangle besides the file.
 pub fn load(path: &Path) -> Result<Mesh, MeshError> {
-    parse(&read(path)?, path)
+    load_as(path)
+}
+
+/// Reads the mesh file at `path` as triangles in f32 or f64.
+pub(crate) fn load_as<T: FromFile>(path: &Path) -> Result<Mesh<T>, MeshError> {
+    parse_as(&read(path)?, path)
 }
 
 /// Reads the bytes of a mesh file as [`load`] does. `path` names the file in errors, and a glTF
 /// file's references are relative to its folder.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
+    parse_as(bytes, path)
+}
+
+fn parse_as<T: FromFile>(bytes: &[u8], path: &Path) -> Result<Mesh<T>, MeshError> {
     let is_utf_16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
     let parsed = match Format::of(bytes, path) {
         _ if bytes.trim_ascii().is_empty() => {
@@ -101,6 +112,10 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
         }
         _ if is_utf_16 && !stl::is_binary(bytes) => {
             Err(Fault::of_file("the text is UTF-16; expected UTF-8 or ASCII"))
+        }
+        _ if other::kind(bytes).is_some() && !stl::is_binary(bytes) => {
+            let found = other::kind(bytes).unwrap_or_default();
+            Err(Fault::of_file(format!("{found}; expected an OBJ, PLY, STL or glTF file")))
         }
         Format::Obj => obj::parse(bytes),
         Format::Ply => ply::parse(bytes),

@@ -1,6 +1,6 @@
 //! Reads the triangles of a Wavefront OBJ file, or reports the first invalid line.
 //!
-//! `tobj` parses the numbers and resolves relative indices. It receives only the `v` and `f`
+//! `tobj` parses the numbers in f64 and resolves relative indices. It receives only the `v` and `f`
 //! statements that `Geometry` finds, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle,
 //! skips the first vertex after a byte order mark, and rejects Latin-1 comments, comments at the end
 //! of a line, continued lines, and files in which only some vertices have a colour. Its errors name
@@ -11,17 +11,18 @@
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
 //! continues a statement on the next line.
 
-use super::mesh::{Fault, Mesh, Rounding, counted};
+use super::mesh::{Fault, FromFile, Mesh, Rounding, counted};
 use super::polygon::{MOST_CORNERS, Polygons};
 use super::text::{self, number, shown};
 use glam::{DMat3, DVec3};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Reads the bytes of an OBJ file. Any bytes give a mesh or an error. O(bytes), and more for faces
 /// that are not convex.
-pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let geometry = Geometry::of(bytes)?;
+pub fn parse<T: FromFile>(bytes: &[u8]) -> Result<Mesh<T>, Fault> {
+    let geometry = Geometry::<T>::of(bytes)?;
     let options =
         tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     // No statement names a material, so that `tobj` asks for no material file.
@@ -33,7 +34,9 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
     // `tobj` keeps exactly the vertices that faces use, and names no lengths of faces if all are
     // triangles.
-    let mut polygons = Polygons::new(mesh.positions.as_chunks().0);
+    let positions = mesh.positions.as_chunks().0.iter();
+    let vertices: Vec<DVec3> = positions.map(|&p| DVec3::from(p).map(T::round)).collect();
+    let mut polygons = Polygons::new(&vertices);
     let mut indices = &mesh.indices[..];
     let mut arities = mesh.face_arities.iter();
     for &line in &geometry.lines {
@@ -85,8 +88,7 @@ pub fn turned(bytes: &[u8], rotation: &DMat3) -> Result<Vec<u8>, Fault> {
 }
 
 /// The checked statements of a file.
-#[derive(Default)]
-struct Geometry {
+struct Geometry<T> {
     /// The statements for `tobj`.
     text: Vec<u8>,
     /// The line of each face in `text`.
@@ -101,10 +103,10 @@ struct Geometry {
     invalid: BTreeMap<usize, Fault>,
     /// The vertices below a face that the face names, counted from 1, and the face's line.
     ahead: Vec<(usize, usize)>,
-    rounding: Rounding,
+    rounding: Rounding<T>,
 }
 
-impl Geometry {
+impl<T: FromFile> Geometry<T> {
     /// Checks the statements of a file.
     ///
     /// # Errors
@@ -112,7 +114,16 @@ impl Geometry {
     /// The first fault in the order of the file. A fault of a vertex below the face that names it
     /// is found only at the end of the file, and is reported last.
     fn of(bytes: &[u8]) -> Result<Self, Fault> {
-        let mut geometry = Self::default();
+        let mut geometry = Self {
+            text: Vec::new(),
+            lines: Vec::new(),
+            vertices: 0,
+            short_faces: 0,
+            unknown: None,
+            invalid: BTreeMap::new(),
+            ahead: Vec::new(),
+            rounding: Rounding::default(),
+        };
         let mut statements = Statements::new(bytes);
         let mut words = Vec::new();
         while let Some((keyword, line)) = statements.next(&mut words) {
@@ -164,10 +175,14 @@ impl Geometry {
         }
         // `tobj` divides by the weight, and x / ∞ is finite.
         let [position @ .., weight] = numbers;
-        let is_divisible = position.iter().all(|x| (x / weight).is_finite());
+        let is_divisible = position.iter().all(|x| T::round(x / weight).is_finite());
         let infinite = numbers.iter().position(|number| !number.is_finite());
         match infinite.or((!is_divisible).then_some(3)) {
-            None => self.add(b'v', words.iter().copied()),
+            None => {
+                let is_divided = words.len() == 4;
+                let numbers = words.iter().zip(numbers);
+                self.add(b'v', numbers.map(|(word, x)| digits::<T>(word, x, is_divided)));
+            }
             Some(place) => {
                 // Some programs write vertices that they do not use in this way.
                 self.invalid.insert(self.vertices, fault(place));
@@ -209,18 +224,18 @@ impl Geometry {
         if words.len() < 3 {
             self.short_faces += 1;
         } else {
-            self.add(b'f', words.iter().map(|word| vertex_index(word)));
+            self.add(b'f', words.iter().map(|word| vertex_index(word).into()));
             self.lines.push(line);
         }
         Ok(())
     }
 
     /// Adds a statement to the text for `tobj`.
-    fn add<'a>(&mut self, keyword: u8, words: impl Iterator<Item = &'a [u8]>) {
+    fn add<'a>(&mut self, keyword: u8, words: impl Iterator<Item = Cow<'a, [u8]>>) {
         self.text.push(keyword);
         for word in words {
             self.text.push(b' ');
-            self.text.extend_from_slice(word);
+            self.text.extend_from_slice(&word);
         }
         self.text.push(b'\n');
     }
@@ -228,6 +243,15 @@ impl Geometry {
     fn check(&self, vertex: usize) -> Result<(), Fault> {
         self.invalid.get(&vertex).map_or(Ok(()), |fault| Err(fault.clone()))
     }
+}
+
+/// Returns the digits for `tobj` of a coordinate or weight `number` that `word` spells: the word
+/// itself if [`FromFile::round`] of what `tobj` makes of it is what it must be. It is not if rounding
+/// to f64 first changes the number, or if a vertex is divided before it is rounded.
+fn digits<T: FromFile>(word: &[u8], number: f64, is_divided: bool) -> Cow<'_, [u8]> {
+    let in_f64: Option<f64> = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
+    let kept = if is_divided { in_f64 } else { in_f64.map(T::round) };
+    if kept == Some(number) { word.into() } else { format!("{number:e}").into_bytes().into() }
 }
 
 /// Returns the `7` of `7`, `7/1`, `7//3` and `7/1/3`.
@@ -320,6 +344,29 @@ fn is_ignored(word: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bvh_core::{DTriangle, Triangle};
+
+    #[test]
+    fn a_number_in_f32_is_rounded_once_and_divided_afterwards() {
+        let mut differ = [0; 2];
+        for k in 0..1000 {
+            let below = f32::from_bits(1.0f32.to_bits() + 7919 * k);
+            // A little more than half the way to the next number, which f64 cannot tell from half.
+            let half = f64::from(below) + 2f64.powi(-24);
+            let (word, divisor) = (format!("{half:.60}1"), (0.37 * f64::from(k + 1)).to_string());
+            let (exact, weight): (f64, f64) = (word.parse().unwrap(), divisor.parse().unwrap());
+            let file = format!("v {word} 0 0\nv 0 1 0\nv {word} 0 1 {divisor}\nf 1 2 3");
+            let x = |file: &str| parse::<Triangle>(file.as_bytes()).unwrap().triangles[0].0;
+            let [whole, _, divided] = x(&file).map(|corner| corner.x);
+            assert_eq!(whole.to_bits(), below.next_up().to_bits(), "{word}");
+            assert_eq!(divided.to_bits(), (whole / weight as f32).to_bits(), "{word} {divisor}");
+            let in_f64 = parse::<DTriangle>(file.as_bytes()).unwrap().triangles[0].0;
+            assert_eq!(in_f64.map(|corner| corner.x), [exact, 0.0, exact / weight]);
+            differ[0] += u32::from(exact as f32 != whole);
+            differ[1] += u32::from((exact / weight) as f32 != divided);
+        }
+        assert!(differ.iter().all(|&count| count > 100), "{differ:?}");
+    }
 
     #[test]
     fn an_endless_statement_needs_memory_for_a_limited_number_of_words() {

@@ -1,6 +1,6 @@
 //! Mesh files whose meshes stand along axes of their own, with the rotation back beside them.
 
-use super::mesh::Fault;
+use super::mesh::{Fault, Mesh};
 use super::{Format, MeshError, gltf, obj};
 use bvh_core::Triangle;
 use glam::DMat3;
@@ -35,7 +35,7 @@ pub struct Oriented {
 pub fn orient(bytes: &[u8], path: &Path, out: &Path, find: Find) -> Result<Oriented, MeshError> {
     let oriented = match Format::of(bytes, path) {
         Format::Gltf => gltf::orient(bytes, path, out, find),
-        Format::Obj => obj::parse(bytes).and_then(|mesh| {
+        Format::Obj => obj::parse(bytes).and_then(|mesh: Mesh| {
             let rotation = find(0, &mesh.triangles);
             let new = rotation.map_or(Ok(bytes.to_vec()), |rotation| obj::turned(bytes, &rotation));
             let turned = rotation.iter().map(|_| 0).collect();

@@ -4,9 +4,10 @@
 //! Latin-1, lines that end in CR, elements without properties, and `-nan(ind)`; it reads an element
 //! that is declared twice at wrong places; and its errors speak of its grammar.
 
-use super::mesh::{AFTER_END, Fault, MOST_TRIANGLES, Mesh, Rounding, counted};
+use super::mesh::{AFTER_END, Fault, FromFile, MOST_TRIANGLES, Mesh, Rounding, counted};
 use super::polygon::Polygons;
 use super::{text, without_mark};
+use glam::DVec3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -71,9 +72,9 @@ enum Encoding {
 }
 
 /// Reads the bytes of a PLY file. O(bytes), and more for polygons that are not convex.
-pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
+pub fn parse<T: FromFile>(bytes: &[u8]) -> Result<Mesh<T>, Fault> {
     let rest = without_mark(bytes);
-    let rounding = Rounding::default();
+    let rounding = Rounding::<T>::default();
     let mut file = File { rest, line: 0, words: &[], encoding: Encoding::Text, rounding };
     let elements = file.header().map_err(|message| Fault::in_line(file.line, message))?;
     let mut vertices = Vec::new();
@@ -82,7 +83,7 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     for Element { name, count, properties } in &elements {
         // An element without properties has no bytes, whatever its count.
         for number in 0..if properties.is_empty() { 0 } else { *count } {
-            let mut point = [f32::NAN; 3];
+            let mut point = DVec3::NAN;
             file.element(properties, &mut point, &mut indices).map_err(|message| {
                 let name = format!("{name} {number}, counted from 0");
                 match file.encoding {
@@ -117,17 +118,17 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
 }
 
 /// The part of a file that is not read yet.
-struct File<'a> {
+struct File<'a, T> {
     rest: &'a [u8],
     /// The number of lines taken so far.
     line: usize,
     /// The rest of the current line.
     words: &'a [u8],
     encoding: Encoding,
-    rounding: Rounding,
+    rounding: Rounding<T>,
 }
 
-impl<'a> File<'a> {
+impl<'a, T: FromFile> File<'a, T> {
     /// Reads the header, and everything up to the first byte of the first element.
     fn header(&mut self) -> Result<Vec<Element>, String> {
         // Only in a file whose lines end in CR alone may the body begin with LF.
@@ -147,7 +148,7 @@ impl<'a> File<'a> {
             let lossy = String::from_utf8_lossy(line);
             let words: Vec<&str> = lossy.split_ascii_whitespace().collect();
             match words[..] {
-                ["ply"] if self.line == 1 => {}
+                [word] if self.line == 1 && word.eq_ignore_ascii_case("ply") => {}
                 _ if self.line == 1 => {
                     return Err(format!("`{}`; expected ply", text::shown(line)));
                 }
@@ -194,7 +195,7 @@ impl<'a> File<'a> {
     fn element(
         &mut self,
         properties: &[Property],
-        point: &mut [f32; 3],
+        point: &mut DVec3,
         indices: &mut Vec<i64>,
     ) -> Result<(), String> {
         while self.encoding == Encoding::Text && self.words.is_empty() {
@@ -239,7 +240,7 @@ impl<'a> File<'a> {
         }
     }
 
-    fn float(&mut self, scalar: Scalar) -> Result<f32, String> {
+    fn float(&mut self, scalar: Scalar) -> Result<f64, String> {
         if scalar.kind != Kind::Float {
             let number = self.integer(scalar)? as f64;
             return Ok(self.rounding.round(number));
@@ -251,7 +252,7 @@ impl<'a> File<'a> {
         }
         let bits = self.bytes(scalar)?;
         Ok(match scalar.size {
-            4 => f32::from_bits(bits as u32),
+            4 => f64::from(f32::from_bits(bits as u32)),
             _ => self.rounding.round(f64::from_bits(bits)),
         })
     }
@@ -295,15 +296,16 @@ const ENDS: &str = "the file ends here; expected the elements of the header";
 
 impl Element {
     fn add(&mut self, types: &[&str], name: &str) -> Result<(), String> {
-        if self.properties.iter().any(|property| property.name == name) {
-            return Err(format!("property `{name}` repeats a name; expected each once"));
-        }
         let axis = ["x", "y", "z"].iter().position(|axis| *axis == name);
         let purpose = match (self.name.as_str(), axis) {
             ("vertex", Some(axis)) => Purpose::Axis(axis),
             ("face", _) if matches!(name, "vertex_indices" | "vertex_index") => Purpose::Indices,
             _ => Purpose::Ignored,
         };
+        let is_repeated = self.properties.iter().any(|property| property.name == name);
+        if is_repeated && purpose != Purpose::Ignored {
+            return Err(format!("property `{name}` repeats a name; expected each once"));
+        }
         let (length, scalar) = match *types {
             [scalar] => (None, Scalar::named(scalar)?),
             ["list", length, scalar] => (Some(Scalar::named(length)?), Scalar::named(scalar)?),

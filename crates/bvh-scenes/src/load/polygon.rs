@@ -1,9 +1,8 @@
 //! Polygons, split into triangles.
 
 use super::ears::ears;
-use super::mesh::{UNUSED, counted};
-use bvh_core::Triangle;
-use glam::{DVec2, DVec3, Vec3};
+use super::mesh::{FromFile, UNUSED, counted};
+use glam::{DVec2, DVec3};
 
 /// The largest number of vertices of one polygon. The triangles of a larger one would need a hundred
 /// bytes of memory for every two bytes of the file.
@@ -22,12 +21,11 @@ const MOST_STEPS: u64 = 1 << 30;
 const FREE_STEPS: u64 = 1 << 8;
 
 /// The triangles of polygons between vertices, in the order in which the polygons were added.
-#[derive(Default)]
-pub struct Polygons<'a> {
-    vertices: &'a [[f32; 3]],
+pub struct Polygons<'a, T> {
+    vertices: &'a [DVec3],
     /// Whether a polygon has the vertex.
     is_used: Vec<bool>,
-    pub triangles: Vec<Triangle>,
+    pub triangles: Vec<T>,
     /// The number of polygons with fewer than three corners, which have no triangle.
     pub short: usize,
     /// The number of polygons that no triangles between their corners cover.
@@ -35,14 +33,22 @@ pub struct Polygons<'a> {
     /// The steps that remain of [`MOST_STEPS`].
     steps: u64,
     /// The corners of the polygon that is being added, and their projections.
-    corners: Vec<Vec3>,
+    corners: Vec<DVec3>,
     flat: Vec<DVec2>,
 }
 
-impl<'a> Polygons<'a> {
-    pub fn new(vertices: &'a [[f32; 3]]) -> Self {
-        let is_used = vec![false; vertices.len()];
-        Self { vertices, is_used, steps: MOST_STEPS, ..Self::default() }
+impl<'a, T: FromFile> Polygons<'a, T> {
+    pub fn new(vertices: &'a [DVec3]) -> Self {
+        Self {
+            vertices,
+            is_used: vec![false; vertices.len()],
+            triangles: Vec::new(),
+            short: 0,
+            crossing: 0,
+            steps: MOST_STEPS,
+            corners: Vec::new(),
+            flat: Vec::new(),
+        }
     }
 
     /// Adds the polygon with the vertices of these indices; a last one that repeats the first is no
@@ -65,20 +71,23 @@ impl<'a> Polygons<'a> {
         }
         match self.corners[..] {
             [] | [_] | [_, _] => self.short += 1,
-            [a, b, c] => self.triangles.push(Triangle([a, b, c])),
+            [a, b, c] => self.triangles.push(T::of([a, b, c])),
             _ => self.split()?,
         }
         Ok(())
     }
 
-    fn vertex(&mut self, index: i64) -> Result<Vec3, String> {
+    fn vertex(&mut self, index: i64) -> Result<DVec3, String> {
         let count = self.vertices.len();
         let place = usize::try_from(index).ok().filter(|place| *place < count);
         let place = place.ok_or_else(|| format!("vertex {index}; expected 0 to below {count}"))?;
         self.is_used[place] = true;
-        match Vec3::from(self.vertices[place]) {
+        match self.vertices[place] {
             point if point.is_finite() => Ok(point),
-            point => Err(format!("vertex {index} at {point}; expected finite x, y and z")),
+            point => {
+                let point = point.as_vec3();
+                Err(format!("vertex {index} at {point}; expected finite x, y and z"))
+            }
         }
     }
 
@@ -98,7 +107,7 @@ impl<'a> Polygons<'a> {
     fn split(&mut self) -> Result<(), String> {
         self.flatten();
         let (corners, flat, last) = (&self.corners, &self.flat, self.corners.len() as u32 - 1);
-        let at = |triangle: [u32; 3]| Triangle(triangle.map(|corner| corners[corner as usize]));
+        let at = |triangle: [u32; 3]| T::of(triangle.map(|corner| corners[corner as usize]));
         // Twice the signed area.
         let area = |[a, b, c]: [u32; 3]| {
             let [a, b, c] = [a, b, c].map(|corner| flat[corner as usize]);
@@ -127,6 +136,8 @@ impl<'a> Polygons<'a> {
             self.triangles.extend(fan.map(at));
             return Ok(());
         }
+        // What an edge encloses that runs out and back, or a corner that repeats another, has no area.
+        ears.resize(last as usize - 1, [0; 3]);
         // One order, and the polygon's orientation, whatever ear was cut first.
         ears.iter_mut().for_each(|ear| ear.sort_unstable());
         ears.sort_unstable();
@@ -138,7 +149,7 @@ impl<'a> Polygons<'a> {
     /// counterclockwise.
     fn flatten(&mut self) {
         let corners = &self.corners;
-        let from_first = |corner: &Vec3| corner.as_dvec3() - corners[0].as_dvec3();
+        let from_first = |corner: &DVec3| *corner - corners[0];
         let normal: DVec3 =
             corners.windows(2).map(|pair| from_first(&pair[0]).cross(from_first(&pair[1]))).sum();
         let axis = normal.abs().max_position();
@@ -147,9 +158,6 @@ impl<'a> Polygons<'a> {
             (u, v) = (v, u);
         }
         self.flat.clear();
-        self.flat.extend(corners.iter().map(|corner| {
-            let corner = corner.as_dvec3();
-            DVec2::new(corner[u], corner[v])
-        }));
+        self.flat.extend(corners.iter().map(|corner| DVec2::new(corner[u], corner[v])));
     }
 }

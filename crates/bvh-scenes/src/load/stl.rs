@@ -4,10 +4,11 @@
 //! solids, mistakes `solid` without a name for a binary file, names no line, and knows neither of
 //! the ways in which programs write comments, colours, `end loop` and counts.
 
-use super::mesh::{AFTER_END, Fault, Mesh, Rounding, counted};
+use super::mesh::{AFTER_END, Fault, FromFile, Mesh, Rounding, counted};
 use super::{text, without_mark};
-use bvh_core::Triangle;
-use glam::Vec3;
+use glam::DVec3;
+use std::iter::Peekable;
+use std::str::SplitWhitespace;
 
 /// The number of bytes before the triangles of a binary file: a comment of 80 bytes, and the number
 /// of triangles.
@@ -26,17 +27,18 @@ pub fn is_binary(bytes: &[u8]) -> bool {
     promised(bytes).is_some_and(|facets| facets > 0 && bytes.len() == HEADER + FACET * facets)
 }
 
-/// Returns whether text is that of an STL file: whether it begins with `solid`, after comments, and
-/// names a facet. The beginning of a binary file contains zeros.
+/// Returns whether text is that of an STL file: whether it begins with `solid` or `facet`, after
+/// comments, and has a word that follows these. The beginning of a binary file contains zeros.
 pub fn is_text(text: &[u8]) -> bool {
     let mut rest = text;
     let first = std::iter::from_fn(|| text::line(&mut rest)).find(|line| !is_comment(line));
     let mut words = first.into_iter().flat_map(text::words).chain(text::words(rest));
-    words.next().is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+    let is = |word: &[u8], keywords: &[&[u8]]| {
+        keywords.iter().any(|keyword| word.eq_ignore_ascii_case(keyword))
+    };
+    words.next().is_some_and(|word| is(word, &[b"solid", b"facet"]))
         && !text[..text.len().min(HEADER + FACET)].contains(&0)
-        && words.any(|word| {
-            [&b"facet"[..], b"endsolid", b"end"].iter().any(|k| word.eq_ignore_ascii_case(k))
-        })
+        && words.any(|word| is(word, &[b"facet", b"endfacet", b"endsolid", b"end"]))
 }
 
 fn is_comment(line: &[u8]) -> bool {
@@ -44,8 +46,10 @@ fn is_comment(line: &[u8]) -> bool {
 }
 
 /// Reads the bytes of an STL file. O(bytes).
-pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let text = without_mark(bytes);
+pub fn parse<T: FromFile>(bytes: &[u8]) -> Result<Mesh<T>, Fault> {
+    let text = without_mark(bytes).trim_ascii_end();
+    // Programs of DOS end a text with Ctrl-Z.
+    let text = text.strip_suffix(b"\x1a").unwrap_or(text);
     let is_text = !is_binary(bytes) && is_text(text);
     let (triangles, remarks) = match is_text {
         true => parse_text(text)?,
@@ -59,7 +63,7 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
 
 /// Reads the triangles of a binary file, and returns a remark if the header does not give their
 /// number or bytes follow them.
-fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
+fn parse_binary<T: FromFile>(bytes: &[u8]) -> Result<(Vec<T>, Option<String>), Fault> {
     let promised = promised(bytes).ok_or_else(|| {
         let message =
             format!("{} bytes; expected the {HEADER} of a binary STL file's header", bytes.len());
@@ -67,8 +71,9 @@ fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> 
     })?;
     let body = &bytes[HEADER..];
     let (room, after) = (body.len() / FACET, body.len() % FACET);
-    // Programs that write while they compute do not always return to the header.
-    let is_unwritten = matches!(promised, 0 | 0xffff_ffff) && after == 0;
+    // Programs that write while they compute do not always return to the header, where zeros, ones
+    // or blanks then stand.
+    let is_unwritten = matches!(promised, 0 | 0xffff_ffff | 0x2020_2020) && after == 0;
     if !is_unwritten && (room < promised || room > promised && after == 0) {
         let message = format!("room for {room} facets; expected the {promised} of the header");
         return Err(Fault::of_file(message));
@@ -90,7 +95,8 @@ fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> 
             let message = format!("coordinate {found}; expected a finite number");
             return Err(Fault::of(&format!("facet {number}, counted from 0"), message));
         }
-        triangles.push(Triangle::from(corners));
+        let corner = |i: usize| DVec3::from_array([i, i + 1, i + 2].map(|i| corners[i].into()));
+        triangles.push(T::of([corner(0), corner(3), corner(6)]));
     }
     let ignored = counted(AFTER_END, rest.len());
     let unwritten = (is_unwritten && facets > 0)
@@ -115,10 +121,10 @@ const KEYWORDS: [&str; 9] =
 
 /// Reads the corners of every loop, three at a time, and returns a remark on their rounding.
 /// Normals, colours and names are ignored.
-fn parse_text(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
-    let mut rounding = Rounding::default();
+fn parse_text<T: FromFile>(bytes: &[u8]) -> Result<(Vec<T>, Option<String>), Fault> {
+    let mut rounding = Rounding::<T>::default();
     let mut triangles = Vec::new();
-    let mut corners: Vec<Vec3> = Vec::new();
+    let mut corners: Vec<DVec3> = Vec::new();
     let mut rest = bytes;
     let mut line = 0;
     let mut inside = false;
@@ -148,7 +154,7 @@ fn parse_text(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
                 ("endloop" | "endfacet", _) | ("end", "loop" | "facet") => {
                     match *corners {
                         [] => {}
-                        [a, b, c] => triangles.push(Triangle([a, b, c])),
+                        [a, b, c] => triangles.push(T::of([a, b, c])),
                         _ => {
                             let count = corners.len();
                             return Err(fault(format!(
@@ -166,8 +172,9 @@ fn parse_text(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
                 ("outer", _) => {
                     words.next_if(|word| *word == "loop");
                 }
-                // A name follows.
-                ("solid" | "endsolid", _) | ("end", "solid") => break,
+                // A name follows, up to the end of the line or, if all is in one line, to a facet.
+                ("solid", _) | ("end", "solid") => skip_name(&mut words),
+                (word, _) if word.starts_with("endsolid") => skip_name(&mut words),
                 _ => {
                     let expected = "expected a keyword of an STL file, such as facet or vertex";
                     return Err(fault(format!("`{word}`; {expected}")));
@@ -183,9 +190,14 @@ fn parse_text(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
     Ok((triangles, remark))
 }
 
-fn corner(words: &[&str], rounding: &mut Rounding) -> Option<Vec3> {
+fn skip_name(words: &mut Peekable<SplitWhitespace>) {
+    let is_name = |rest: &Peekable<SplitWhitespace>| !rest.clone().take(2).eq(["facet", "normal"]);
+    while is_name(words) && words.next().is_some() {}
+}
+
+fn corner<T: FromFile>(words: &[&str], rounding: &mut Rounding<T>) -> Option<DVec3> {
     let &[x, y, z] = words else { return None };
     let mut number = |word: &str| text::number(word.as_bytes(), rounding);
-    let corner = Vec3::new(number(x)?, number(y)?, number(z)?);
+    let corner = DVec3::new(number(x)?, number(y)?, number(z)?);
     corner.is_finite().then_some(corner)
 }

@@ -1,6 +1,6 @@
 //! Lines, words and numbers of text files.
 
-use super::mesh::Rounding;
+use super::mesh::{FromFile, Rounding};
 
 /// Takes the first line off `rest`, without its end: LF, CRLF or CR.
 pub fn line<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
@@ -18,16 +18,16 @@ pub fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// Returns the number that a word spells, rounded to single precision. Accepts the spellings of NaN
+/// Returns the number that a word spells, rounded for triangles `T`. Accepts the spellings of NaN
 /// and of infinity in Microsoft's C library, such as `-nan(ind)` and `1.#INF`.
-pub fn number(word: &[u8], rounding: &mut Rounding) -> Option<f32> {
+pub fn number<T: FromFile>(word: &[u8], rounding: &mut Rounding<T>) -> Option<f64> {
     let word = std::str::from_utf8(word).ok()?;
-    if let Ok(number) = word.parse() {
+    if let Some(number) = T::parse(word) {
         rounding.note(number, || word.parse().ok());
         return Some(number);
     }
     let word = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
-    (word.starts_with("nan(") || word.starts_with("1.#")).then_some(f32::NAN)
+    (word.starts_with("nan(") || word.starts_with("1.#")).then_some(f64::NAN)
 }
 
 /// Makes a word printable for an error message, and short even if the file is one endless word.

@@ -2,9 +2,10 @@
 //! contain, with a remark where a reader has to choose. Faults are named.
 
 use crate::samples::{
-    buffer, changes, data_uri, error, glb, gltf, gltf_json, ply_binary, ply_text, read, samples,
-    square, stl_binary, stl_text, with,
+    GLTF as JSON, buffer, changes, data_uri, error, glb, gltf, gltf_json, ply_binary, ply_text,
+    read, samples, square, stl_binary, stl_text, with,
 };
+use base64::Engine;
 
 const PLY: &str = r"
 \n ⇒ \r |
@@ -13,12 +14,14 @@ const PLY: &str = r"
 end_header\n → end_header\n\n |
 0 1 2 3\n → 0 1 2 3 |
 comment a square → comment |
+ply\n → PLY\n |
 ply\n → ply\ncomment caf\xe9\n |
 comment a square → obj_info num_cols 5 |
  255 ⇒ \x09 255  |
 255 ⇒ nan |
 4\nprop → 5\nprop & 4 0 1 2 → -nan(ind) nan 1.#QNAN 0\n4 0 1 2 | vertices that no face uses: 1
 end_header → element cell 4000000000\nend_header |
+element face → property uchar red\nelement face & 255\n ⇒ 255 255\n |
 end_header → element tristrips 0\nproperty list int int vertex_indices\nend_header |
 element v → element camera 2\nproperty list uchar float m\nelement v & 0 0 0 → 2 nan 5\n0\n0 0 0 |
 4 0 1 2 3 → 5 0 1 2 3 0 |
@@ -54,6 +57,9 @@ const STL: &str = r"
 \r\n ⇒ \r |
 endloop ⇒ end loop & endfacet ⇒ end facet |
 endsolid ⇒ end solid |
+endsolid → endsolidAscii |
+\r\n ⇒ \x20 |
+solid a square\r\n → |
 endloop ⇒ END LOOP |
 \r\n\x20\x20 ⇒ \x20 |
 normal 0 0 1 ⇒ normal NaN -nan(ind) 1.#QNAN |
@@ -130,6 +136,13 @@ const GLTF: &str = r#"
 "indices": 1 → "indices": 1, "mode": 99 ! meshes[0].primitives[0]: mode 99; expected 0 to 6
 5126 → 5125 ! accessors[0]: VEC3 of unsigned int; expected VEC3 of float or byte
 "byteLength": 60 → "byteLength": 61 ! buffers[0]: 60 bytes; expected 61
+[{"mesh": 0}] → [{"mesh": 0, "children": null, "weights": null}] |
+"indices": 1 → "indices": 1, "mode": null, "targets": null |
+"nodes": [0] → "nodes": [0, 1] & [{"mesh": 0}] → [{"children": [1]}, {"mesh": 0}] |
+0, "byteLength": 48 → 0, "byteStride": 0, "byteLength": 48 |
+5126, "count": 4 → 5126.0, "count": 4.0 |
+5126, "count": 4 → 5126, "count": 4.5 ! 4.5; expected a whole number
+"scenes": [ → "animations": {}, "scenes": [ & "2.0" → "1.0" ! a.gltf: asset: version `1.0` | gltf-pipeline
 [{"mesh": 0}] → [{"children": [1]}, {"children": [0], "mesh": 0}] ! expected a tree of nodes
 [{"mesh": 0}] → [{"children": [0], "mesh": 0}] ! expected a tree of nodes
 [{"mesh": 0}] → [{"children": [1, 1]}, {"mesh": 0}] ! expected a tree of nodes
@@ -148,7 +161,6 @@ const GLTF: &str = r#"
 {"asset" → {"extras": {"mesh": 4294967296}, "asset" |
 {"version" → {"copyright": "\xa9 2019", "extras": [1e999, "\x5cud800"], "version" |
 "version" → "version": "2.0", "version" ! duplicate field `version`
-"indices": 1 → "indices": 1, "mode": null ! invalid type: null
 "#;
 
 /// Asserts that the file contains the square, and nothing but what the remark names.
@@ -182,6 +194,7 @@ fn files_as_programs_write_them_are_read_and_faults_are_named_with_their_places(
         }
     }
     let more = [&ply_text()[..], b"1 2 3\n"].concat();
+    assert_square("Ctrl-Z", &[&stl_text()[..], b"\x1a"].concat(), "a.stl", "");
     assert_square("more lines", &more, "a.ply", "bytes ignored at the end: 5");
     assert_square("a long name", &with(&stl_text(), "a square", &"n".repeat(5000)), "a.stl", "");
     assert_square("capitals", &samples()[0].2.to_ascii_uppercase(), "a.obj", "");
@@ -190,6 +203,7 @@ fn files_as_programs_write_them_are_read_and_faults_are_named_with_their_places(
     let long = with(&ply_text(), "element face 1", &face);
     assert_refused(long, "a.ply", &["a.ply:16: facefaceface", "…"]);
     assert_refused(format!("v 0 0 {}", "x".repeat(1_000_000)), "a.obj", &["a.obj:1: ", "…"]);
+    assert_refused(b"glTF\x01\0\0\0", "a.glb", &["a.glb: asset: version `1`; expected 2.0"]);
     assert_refused("[package]\nname = 1\n", "a.obj", &["a.obj: 0 vertices and no face"]);
     let cut = &["a.ply: vertex 1, counted from 0: z: the file ends"];
     assert_refused(&ply_binary(false)[..190], "a.ply", cut);
@@ -242,6 +256,7 @@ fn binary_stl_files_as_programs_write_them() {
         ("zeros at the end", [&stl[..], &[0; 2]].concat(), "bytes ignored at the end: 2"),
         ("facets and more", [&stl[..], &[0; 57]].concat(), "bytes ignored at the end: 57"),
         ("none counted", counted(0), "the header counts 0 facets and the file has 2"),
+        ("blanks", counted(0x2020_2020), "the header counts 538976288 facets and the file has 2"),
         ("-1", counted(u32::MAX), "the header counts 4294967295 facets and the file has 2"),
     ] {
         assert_square(case, &bytes, "a.stl", remark);
@@ -280,10 +295,110 @@ fn gltf_files_as_programs_write_them() {
         assert_square(&uri, &json(&uri), "a.gltf", "");
     }
     assert_square("padding by zeros", &nuls, "a.gltf", "");
+    let marked = crate::glb::glb(format!("\u{feff}{JSON}"), &buffer());
+    assert_square("a mark in the chunk", &marked, "a.glb", "");
     let version = with(&json(&data_uri()), r#""2.0""#, "2.0");
     assert_square("the version as a number", &version, "a.gltf", "");
     let message = error(json("data:;base64,A"), "a.gltf");
     assert!(message.contains("buffers[0]: a data URI of invalid base64"), "{message}");
+}
+
+/// Compressed views of the square, as the reference's encoder in JavaScript wrote them: positions
+/// as they are and by the filter for floats, indices of triangles and of any kind.
+const MESHOPT: [[&str; 4]; 2] = [
+    [
+        "\"ATTRIBUTES\"",
+        "oAAAATMAAAD//wEzAAAAfn0AAAEMAAAA/wEMAAAAfgAAAAEMAAAAfgAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA\
+         AAAA",
+        "\"TRIANGLES\"",
+        "4fAAAHaHVmd4qYZliWiYAWkAAA==",
+    ],
+    [
+        "\"ATTRIBUTES\", \"filter\": \"EXPONENTIAL\"",
+        "oAABMwAAAIB/AAEwAAAAygABDAAAAIAAATAAAADKAAEMAAAAQAABMAAAAMoAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAI0A\
+         AACNAAAAjQ==",
+        "\"INDICES\"",
+        "0QAEBAYIBAAAAAA=",
+    ],
+];
+
+#[test]
+fn views_that_meshopt_compressed_are_read_and_damaged_ones_are_named() {
+    for [mode, positions, index_mode, indices] in MESHOPT {
+        let decode = |text: &str| base64::engine::general_purpose::STANDARD.decode(text).unwrap();
+        let [positions, indices] = [decode(positions), decode(indices)];
+        let view = |from: usize, length: usize, count: usize, stride: usize, mode: &str| {
+            format!(
+                r#", "extensions": {{"EXT_meshopt_compression": {{"buffer": 0, "byteOffset": {from},
+                "byteLength": {length}, "byteStride": {stride}, "count": {count}, "mode": {mode}}}}}"#
+            )
+        };
+        let first = view(0, positions.len(), 4, 12, mode);
+        let second = view(positions.len(), indices.len(), 6, 2, index_mode);
+        let (zero, other) =
+            (r#"{"buffer": 0, "byteLength": 48"#, r#"{"buffer": 1, "byteLength": 48"#);
+        let json = JSON
+            .replace(zero, &format!("{other}{first}"))
+            .replace(r#"48, "byteLength": 12"#, &format!(r#"0, "byteLength": 12{second}"#))
+            .replace(
+                r#"[{"byteLength": 60}]"#,
+                &format!(
+                    r#"[{{"byteLength": {}}}, {{"byteLength": 48}}]"#,
+                    positions.len() + indices.len()
+                ),
+            );
+        let binary = [positions, indices].concat();
+        assert_square(mode, &crate::glb::glb(json.clone(), &binary), "a.glb", "");
+        let refused = |json: String, binary: &[u8], words: &[&str]| {
+            assert_refused(crate::glb::glb(json, binary), "a.glb", words);
+        };
+        let mut damaged = binary.clone();
+        damaged[0] = 0;
+        refused(json.clone(), &damaged, &["bufferViews[0]: 4 items of 12 bytes", "meshopt"]);
+        for (from, to, words) in [
+            (
+                "\"count\": 4,",
+                "\"count\": 4000000000000000,",
+                "accessors[0]: 4000000000000000 items",
+            ),
+            (
+                "\"byteStride\": 12, \"count\": 4",
+                "\"byteStride\": 12, \"count\": 5",
+                "5 items of 12",
+            ),
+            ("ATTRIBUTES", "COLOURS", "COLOURS"),
+            ("\"byteOffset\": 0,", "\"byteOffset\": 900,", "the buffer ends before"),
+        ] {
+            refused(json.replacen(from, to, 1), &binary, &[words]);
+        }
+    }
+}
+
+#[test]
+fn files_of_other_kinds_are_rejected_by_their_kind() {
+    for (bytes, kind) in [
+        (&b"\x89BVH\r\n\x1a\n"[..], "a tree"),
+        (b"\n<!doctype html><html>", "a web page"),
+        (b"<?xml version=\"1.0\"?><COLLADA>", "XML"),
+        (b"version https://git-lfs.github.com/spec/v1\noid", "Git LFS"),
+        (b"\x1f\x8b\x08\0", "gzip"),
+        (b"PK\x03\x04\0", "3MF"),
+        (b"Kaydara FBX Binary  \0", "FBX"),
+        (b"; FBX 7.4.0 project file", "FBX"),
+        (b"PXR-USDC\0", "USD"),
+        (b"#usda 1.0\n", "USD"),
+        (b"ISO-10303-21;\nHEADER;", "STEP"),
+        (b"BLENDER-v300", "Blender"),
+        (b"OFF\n3 1 0\n", "OFF"),
+        (b"DRACO\x02\x02", "Draco"),
+    ] {
+        for name in ["a.obj", "a.stl", "a.glb", "a"] {
+            assert_refused(bytes, name, &[kind, "expected an OBJ, PLY, STL or glTF file"]);
+        }
+    }
+    let mut stl = stl_binary();
+    stl[..4].copy_from_slice(b"PK\x03\x04");
+    assert_square("a binary STL file with any comment", &stl, "a.stl", "");
 }
 
 #[test]

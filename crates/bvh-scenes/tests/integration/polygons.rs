@@ -55,6 +55,15 @@ fn a_polygon_that_crosses_itself_is_a_fan_with_a_remark() {
 }
 
 #[test]
+fn an_edge_that_runs_out_and_back_adds_triangles_without_area() {
+    let square =
+        [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 2.0], [1.0, 3.0], [1.0, 2.0], [0.0, 2.0]];
+    let triangles = mesh(&square.map(|[x, y]| [x, y, 0.0])).triangles;
+    let area = |t: &Triangle| (t.0[1] - t.0[0]).cross(t.0[2] - t.0[0]).length() / 2.0;
+    assert_eq!((triangles.len(), triangles.iter().map(area).sum::<f32>()), (5, 4.0));
+}
+
+#[test]
 fn polygons_of_many_corners_are_covered_or_rejected_before_they_take_long() {
     // The teeth of a comb, and a zigzag that crosses itself everywhere.
     let comb = |i: u32| [(i - i % 2) as f32, -1e4 * (i % 2) as f32, 0.0];

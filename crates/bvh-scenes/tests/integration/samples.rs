@@ -73,7 +73,7 @@ pub fn stl_binary() -> Vec<u8> {
 }
 
 /// A scene over a buffer of four positions and of the indices of two triangles, `u16`.
-const GLTF: &str = r#"{"asset": {"version": "2.0"},
+pub const GLTF: &str = r#"{"asset": {"version": "2.0"},
     "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
     "accessors": [

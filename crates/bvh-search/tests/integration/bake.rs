@@ -3,7 +3,7 @@
 use crate::{scatter, work};
 use bvh_scenes::Scene;
 use bvh_search::bvh_core::Primitives;
-use bvh_search::{Objects, Options, OwnedTree, prelude::*};
+use bvh_search::{Anywhere, Objects, Options, OwnedTree, prelude::*};
 use std::time::Instant;
 
 #[test]
@@ -147,6 +147,13 @@ fn references_that_no_bake_may_have_are_rejected_and_a_tree_over_nothing_is_impr
     }
     let nothing = || Objects::Boxes(Vec::new());
     let empty = OwnedTree::find(nothing(), &Options::default(), &()).unwrap();
+    let anywhere: Option<Anywhere> = Some(bvh_scenes::rays::anywhere);
+    for max_work in [None, Some(1000)] {
+        let budget = Budget { max_work, ..Budget::UNLIMITED };
+        let options = Options { budget, anywhere, ..Options::default() };
+        let no_triangles = Objects::Shapes(Primitives::Triangles(Vec::new()));
+        assert!(OwnedTree::find(no_triangles, &options, &()).unwrap().tree().nodes.is_empty());
+    }
     let loaded = OwnedTree::load(nothing(), &empty.save().unwrap()).unwrap();
     assert_eq!(loaded.improvement(Budget::UNLIMITED, &()).unwrap().outcome.cost, 0.0);
 }

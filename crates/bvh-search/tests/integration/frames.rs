@@ -182,9 +182,9 @@ fn a_tree_in_a_frame_keeps_it_and_the_answers_of_rays() {
             assert_eq!(hits(&found), hits(&plain));
             assert!(hits(&found).iter().flatten().count() > 50);
         }
-        let error = owned.export(&Target::ALL[0]).unwrap_err();
+        let error = owned.export(&Target::ALL[0], false).unwrap_err();
         assert!(error.to_string().contains("the file's frame"), "{error}");
-        assert!(plain.export(&Target::ALL[0]).is_ok());
+        assert!(plain.export(&Target::ALL[0], true).is_ok());
     }
 }
 
@@ -212,9 +212,13 @@ fn triangles_in_f64_are_baked_at_map_coordinates_and_traced_from_their_file() {
         let bytes = owned.save().unwrap();
         let loaded = OwnedTree::load(objects(&triangles), &bytes).unwrap();
         assert_eq!((loaded.tree(), loaded.boxes()), (owned.tree(), owned.boxes()));
-        let mut other = triangles.clone();
-        other[0].0[0] += DVec3::splat(1000.0);
-        assert!(OwnedTree::load(objects(&other), &bytes).is_err());
+        // The boxes in f32 stay the same.
+        for moved in [1000.0, 1e-7] {
+            let mut other = triangles.clone();
+            other[0].0[0] += DVec3::splat(moved);
+            let refused = OwnedTree::load(objects(&other), &bytes).map(drop);
+            assert!(matches!(refused, Err(FileError::OtherScene { .. })), "{moved}");
+        }
         let wide = DWideBvh::new(loaded.tree(), &triangles).unwrap();
         for (number, triangle) in triangles.iter().step_by(29).enumerate() {
             let middle = triangle.0.iter().sum::<DVec3>() / 3.0;

@@ -296,4 +296,27 @@ mod tests {
         let wrong = [Aabb::from([[f32::NAN; 3], [1.0; 3]])];
         assert!(build(1, &wrong, &needles(1).as_slice(), &Watch::default()).is_err());
     }
+
+    #[test]
+    fn a_triangle_in_thousands_of_leaves_is_checked_without_too_many_comparisons() {
+        let [a, b, c] = [[0.0; 3], [30.0, 0.0, 3.0], [9.0, 30.0, 0.6]].map(Vec3::from);
+        for (small, expected) in [(12_000, 2000..10_000), (40_000, 14_000..20_000)] {
+            let mut triangles = vec![Triangle([a, b, c])];
+            triangles.extend((0..small).map(|i: u32| {
+                let spread = |salt: u32| {
+                    (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 4093) as f32 / 4093.0
+                };
+                let (u, v) = (spread(3), spread(11));
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let at = a + (b - a) * u + (c - a) * v;
+                Triangle([at, at + Vec3::new(0.1, 0.0, 0.01), at + Vec3::new(0.0, 0.1, 0.02)])
+            }));
+            let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+            let objects = &triangles.as_slice();
+            let tree = build(2 * boxes.len(), &boxes, objects, &Watch::default()).unwrap();
+            let leaves = tree.prim_ids.iter().filter(|&&object| object == 0).count();
+            assert!(expected.contains(&leaves), "{leaves}");
+            assert_eq!(validate_references(&tree, &boxes, objects), Ok(()));
+        }
+    }
 }

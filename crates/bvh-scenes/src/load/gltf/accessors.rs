@@ -85,19 +85,18 @@ impl Buffers<'_> {
             return Ok(Vec::new());
         }
         let number = accessor.buffer_view.filter(|_| accessor.sparse.is_none()).ok_or(
-            "items that are not all in a buffer view; expected them there (sparse accessors and \
-             compressed meshes cannot be read)",
+            "items that are not all in a buffer view; expected them there (sparse accessors cannot \
+             be read)",
         )?;
         let view = get(&self.document.buffer_views, number, "bufferViews")?;
-        let buffer = self.bytes(view.buffer)?;
         let size = size(component);
-        let stride = view.byte_stride.unwrap_or(size * N);
+        let stride = if view.byte_stride == 0 { size * N } else { view.byte_stride };
+        let view = self.view(number)?;
         // Every number comes from the file, so each step checks for overflow and for the end.
         let bytes = || {
-            let bytes = buffer.get(view.byte_offset..)?.get(..view.byte_length)?;
             // The last item needs no padding after it.
             let length = stride.checked_mul(count - 1)?.checked_add(size * N)?;
-            bytes.get(accessor.byte_offset..)?.get(..length).filter(|_| stride >= size * N)
+            view?.get(accessor.byte_offset..)?.get(..length).filter(|_| stride >= size * N)
         };
         let bytes = bytes().ok_or_else(|| {
             format!("bufferViews[{number}] has no room for {count} items; expected it")

@@ -1,9 +1,11 @@
 //! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
 
-use super::document::Document;
+use super::document::{Compressed, Document};
 use super::{MOST_BYTES, get};
 use crate::files::{read, regular};
 use data_url::DataUrl;
+use meshoptimizer_rs::Workspace;
+use meshoptimizer_rs::codec::{BufferView, Filter, Mode};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -19,6 +21,8 @@ pub struct Buffers<'a> {
     contents: BTreeMap<usize, Rc<Vec<u8>>>,
     /// The contents of files by their canonical path. Several buffers may name the same file.
     files: BTreeMap<PathBuf, Rc<Vec<u8>>>,
+    /// The contents of compressed views, by the view's number.
+    decoded: BTreeMap<usize, Vec<u8>>,
     /// Bytes read so far.
     total: u64,
     /// Items of accessors read so far.
@@ -28,8 +32,8 @@ pub struct Buffers<'a> {
 impl<'a> Buffers<'a> {
     /// Prepares the buffers of the file at `path` without reading any.
     pub fn new(document: &'a Document, path: &'a Path, chunk: Option<&'a [u8]>) -> Self {
-        let (contents, files) = (BTreeMap::new(), BTreeMap::new());
-        Self { document, path, chunk, contents, files, total: 0, item_count: 0 }
+        let (contents, files, decoded) = Default::default();
+        Self { document, path, chunk, contents, files, decoded, total: 0, item_count: 0 }
     }
 
     /// Returns the bytes of a buffer, which is read if no mesh has needed it before.
@@ -49,6 +53,41 @@ impl<'a> Buffers<'a> {
         whole.map_err(|message| format!("buffers[{number}]: {message}"))
     }
 
+    /// Returns the bytes of a view, decoded; `None` if the buffer ends before it.
+    pub fn view(&mut self, number: usize) -> Result<Option<&[u8]>, String> {
+        let document = self.document;
+        let view = get(&document.buffer_views, number, "bufferViews")?;
+        if let Some(compressed) = &view.extensions.meshopt {
+            if !self.decoded.contains_key(&number) {
+                let bytes = self
+                    .decode(compressed, view.byte_length)
+                    .map_err(|message| format!("bufferViews[{number}]: {message}"))?;
+                self.decoded.insert(number, bytes);
+            }
+            return Ok(Some(&self.decoded[&number]));
+        }
+        let buffer = self.bytes(view.buffer)?;
+        Ok(part(buffer, view.byte_offset, view.byte_length))
+    }
+
+    /// Decodes a view of this many bytes, as `EXT_meshopt_compression` says.
+    fn decode(&mut self, from: &Compressed, length: usize) -> Result<Vec<u8>, String> {
+        let Compressed { count, byte_stride, ref mode, ref filter, .. } = *from;
+        let filter = filter.as_deref().unwrap_or("NONE");
+        let invalid = |error| {
+            format!("{count} items of {byte_stride} bytes, {mode}, {filter}, meshopt: {error}")
+        };
+        let view = (Mode::parse(mode).and_then(|mode| Ok((mode, Filter::parse(filter)?))))
+            .and_then(|(mode, filter)| BufferView::new(mode, filter, count, byte_stride));
+        let view = view.map_err(invalid)?;
+        view.validate_parent(length, None).map_err(invalid)?;
+        // The count of a small file must not take memory that its bytes cannot fill.
+        self.count(length as u64)?;
+        let bytes = part(self.bytes(from.buffer)?, from.byte_offset, from.byte_length)
+            .ok_or("the buffer ends before its compressed bytes; expected them in it")?;
+        view.decode(bytes, &mut Workspace::default()).map_err(invalid)
+    }
+
     fn contents(&mut self, number: usize, uri: &str) -> Result<&[u8], String> {
         if !self.contents.contains_key(&number) {
             let bytes = self.read(uri)?;
@@ -66,13 +105,12 @@ impl<'a> Buffers<'a> {
         if uri.contains("://") {
             return Err(format!("`{uri}`; expected a file in this folder, or a data URI"));
         }
-        let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
-        let path = self.allowed(Path::new(&*name)).ok_or_else(|| {
-            format!(
-                "`{name}` may be outside the scene's folder; accepted: a file in this folder or \
-                 below, by a path without `..`"
-            )
-        })?;
+        let path = self.path_of(uri).or_else(|error| {
+            // Windows writes `\` for `/`, and viewers on the web add a query.
+            let address = uri.split(['?', '#']).next().unwrap_or_default().replace('\\', "/");
+            self.path_of(&address).map_err(|_| error)
+        });
+        let path = path?;
         if let Some(bytes) = self.files.get(&path) {
             return Ok(Rc::clone(bytes));
         }
@@ -81,6 +119,18 @@ impl<'a> Buffers<'a> {
         let bytes = Rc::new(read(&path).map_err(|error| error.to_string())?);
         self.files.insert(path, Rc::clone(&bytes));
         Ok(bytes)
+    }
+
+    /// Returns the path of the file by a URI, if there is one in the folder.
+    fn path_of(&self, uri: &str) -> Result<PathBuf, String> {
+        let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
+        let path = self.allowed(Path::new(&*name)).ok_or_else(|| {
+            format!(
+                "`{name}` may be outside the scene's folder; accepted: a file in this folder or \
+                 below, by a path without `..`"
+            )
+        })?;
+        regular(&path).map(|_| path).map_err(|error| error.to_string())
     }
 
     /// Returns the canonical path of the file by this name in a URI if it is in the folder of the
@@ -113,6 +163,10 @@ impl<'a> Buffers<'a> {
             false => Ok(()),
         }
     }
+}
+
+fn part(bytes: &[u8], offset: usize, length: usize) -> Option<&[u8]> {
+    bytes.get(offset..)?.get(..length)
 }
 
 #[cfg(test)]

@@ -4,30 +4,40 @@ use super::document::{Document, Node};
 use super::{Fault, Placed, get};
 use glam::{DMat4, DQuat, DVec3};
 
+/// The most by which the elements of a matrix and those of its parts differ, as a fraction of the
+/// largest, if both say the same.
+const ROUNDING: f64 = 1e-6;
+
 /// Returns the transform from a node's coordinates to its parent's.
 fn local(node: &Node) -> Result<DMat4, String> {
     let has_parts = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
-    let Some(matrix) = &node.matrix else {
-        let rotation = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
-        // Exporters round quaternions, which would scale the mesh by a little.
-        let turn = DQuat::from_array(rotation);
-        if !(turn.length() > 0.0 && turn.length().is_finite()) {
-            return Err(format!("rotation {rotation:?}; expected a quaternion of length 1"));
-        }
-        return Ok(DMat4::from_scale_rotation_translation(
-            DVec3::from(node.scale.unwrap_or([1.0; 3])),
-            turn.normalize(),
-            DVec3::from(node.translation.unwrap_or_default()),
-        ));
-    };
+    let Some(matrix) = &node.matrix else { return of_parts(node) };
     if has_parts {
-        let expected = "expected the matrix, or translation, rotation and scale";
-        return Err(format!("a matrix and its parts; {expected}"));
+        let [one, other] = [*matrix, of_parts(node)?.to_cols_array()];
+        let largest = one.iter().fold(0.0, |largest: f64, element| largest.max(element.abs()));
+        if !one.iter().zip(other).all(|(a, b)| (a - b).abs() <= ROUNDING * largest) {
+            let expected = "expected the matrix, or translation, rotation and scale";
+            return Err(format!("a matrix and parts that differ from it; {expected}"));
+        }
     }
     match [matrix[3], matrix[7], matrix[11], matrix[15]] {
         [0.0, 0.0, 0.0, 1.0] => Ok(DMat4::from_cols_array(matrix)),
         row => Err(format!("a matrix with the last row {row:?}; expected 0, 0, 0, 1")),
     }
+}
+
+fn of_parts(node: &Node) -> Result<DMat4, String> {
+    let rotation = node.rotation().unwrap_or([0.0, 0.0, 0.0, 1.0]);
+    // Exporters round quaternions, which would scale the mesh by a little.
+    let turn = DQuat::from_array(rotation);
+    if !(turn.length() > 0.0 && turn.length().is_finite()) {
+        return Err(format!("rotation {rotation:?}; expected a quaternion of length 1"));
+    }
+    Ok(DMat4::from_scale_rotation_translation(
+        DVec3::from(node.scale.unwrap_or([1.0; 3])),
+        turn.normalize(),
+        DVec3::from(node.translation.unwrap_or_default()),
+    ))
 }
 
 /// Follows the default scene, or the first one, from its roots; a file without scenes is one scene.
@@ -51,10 +61,10 @@ pub fn places(document: &Document) -> Result<Vec<Placed>, Fault> {
     let mut open = Vec::new();
     for &root in roots.iter().rev() {
         get(nodes, root, "nodes").map_err(in_scene)?;
-        if is_child[root] {
-            return Err(in_scene(format!("nodes[{root}], the child of another; {tree}")));
+        // A root that is a child, too, is where its parent places it.
+        if !is_child[root] {
+            open.push((root, DMat4::IDENTITY));
         }
-        open.push((root, DMat4::IDENTITY));
     }
     let mut places = Vec::new();
     let mut is_reached = vec![false; nodes.len()];
@@ -73,6 +83,9 @@ pub fn places(document: &Document) -> Result<Vec<Placed>, Fault> {
             get(&document.meshes, mesh, "meshes").map_err(in_node)?;
             places.push(Placed { node: number, mesh, transform });
         }
+    }
+    if let Some(root) = roots.iter().find(|&&root| !is_reached[root]) {
+        return Err(in_scene(format!("nodes[{root}], the child of another; {tree}")));
     }
     Ok(places)
 }

@@ -9,6 +9,7 @@ use super::document::{Document, document, is_covered, text};
 use super::{Fault, get, read};
 use crate::files::folder_of;
 use crate::load::{Find, Oriented};
+use bvh_core::Triangle;
 use glam::{DMat3, DQuat, DVec3};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -26,7 +27,7 @@ const MOST_USES: usize = 4;
 pub fn orient(bytes: &[u8], path: &Path, out: &Path, find: Find) -> Result<Oriented, Fault> {
     let (document, chunk) = document(bytes)?;
     let (text, _, further) = text(bytes)?;
-    let meshes = read(&document, chunk, path)?.meshes;
+    let meshes = read::<Triangle>(&document, chunk, path)?.meshes;
     let mut json: Value = serde_json::from_slice(text).map_err(Fault::of_file)?;
     for list in ["accessors", "bufferViews", "buffers", "meshes", "nodes"] {
         let elements = json[list].as_array();
@@ -199,7 +200,7 @@ impl File<'_> {
         let node = &mut self.json["nodes"][number];
         let mut names = node.as_object().into_iter().flatten().map(|(name, _)| name.as_str());
         if is_still && is_uniform && names.all(|name| OWN.contains(&name)) {
-            let turn = old.rotation.map(|turn| DQuat::from_array(turn).normalize());
+            let turn = old.rotation().map(|turn| DQuat::from_array(turn).normalize());
             let turn = turn.map_or(back, |turn| turn * back.normalize());
             node["rotation"] = json!(turn.to_array());
             return;

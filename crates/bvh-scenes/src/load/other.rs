@@ -1,0 +1,45 @@
+//! Files that are taken for meshes of a known format.
+
+use super::without_mark;
+use bvh_core::file::Header;
+
+/// The kinds of files by their first bytes, in capitals or not.
+const KINDS: [(&[u8], &str); 28] = [
+    (&Header::MAGIC, "a tree, not a scene"),
+    (b"VERSION HTTPS://GIT-LFS", "a pointer of Git LFS, which `git lfs pull` replaces by the file"),
+    (b"<!DOCTYPE HTML", "a web page"),
+    (b"<HTML", "a web page"),
+    (b"<", "XML, as COLLADA and X3D files are"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"BZH", "a bzip2 archive"),
+    (b"\xfd7ZXZ\0", "an xz archive"),
+    (b"\x28\xb5\x2f\xfd", "a Zstandard archive, as new Blender files are"),
+    (b"PK\x03\x04", "a ZIP archive, as 3MF and USDZ files are"),
+    (b"7Z\xbc\xaf\x27\x1c", "a 7z archive"),
+    (b"KAYDARA FBX", "an FBX file"),
+    (b"; FBX", "an FBX file"),
+    (b"PXR-USDC", "a USD file"),
+    (b"#USDA", "a USD file"),
+    (b"ISO-10303-21", "a STEP file"),
+    (b"BLENDER", "a Blender file"),
+    (b"OFF\n", "an OFF file"),
+    (b"OFF\r", "an OFF file"),
+    (b"OFF ", "an OFF file"),
+    (b"COFF", "an OFF file"),
+    (b"NOFF", "an OFF file"),
+    (b"DRACO", "a Draco file"),
+    (b"# VTK", "a VTK file"),
+    (b"#VRML", "a VRML file"),
+    (b"#X3D", "an X3D file"),
+    (b"XOF 0", "a DirectX file"),
+    (b"\x93NUMPY", "an array of numpy"),
+];
+
+/// Returns what a file is, if it is of a known kind that gives no triangles here.
+pub fn kind(bytes: &[u8]) -> Option<&'static str> {
+    let bytes = without_mark(bytes).trim_ascii_start();
+    let begins = |first: &[u8]| {
+        bytes.get(..first.len()).is_some_and(|bytes| bytes.eq_ignore_ascii_case(first))
+    };
+    KINDS.iter().find(|(first, _)| begins(first)).map(|(_, kind)| *kind)
+}
