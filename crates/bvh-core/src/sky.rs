@@ -6,6 +6,8 @@
 
 use crate::Traced;
 use crate::wide::POINTS_OF_BEAM;
+use core::f64::consts::{FRAC_PI_2, PI, TAU};
+use core::num::NonZeroU32;
 use glam::DVec3;
 
 /// Directions that many points look along, and what each is worth.
@@ -121,12 +123,61 @@ impl Sky {
                 return Err(InvalidSky::Direction { index, found });
             }
         }
+        let weights = vec![1.0; directions.len()];
+        Self { directions, range, weights, columns: 1 }.with_range(range)
+    }
+
+    /// Returns the sky above the plane of x (east) and y (north) in patches, and their solid angles
+    /// over π as weights: with cosines, their sum is the sky view factor, 1 for a free horizontal
+    /// surface. The 145 patches of Tregenza for a `division` of 1, the 577 of Reinhart for 2, and so on,
+    /// each by the direction of its middle, in rows from the horizon to the zenith, from north over
+    /// east.
+    ///
+    /// Source: Tregenza 1987, 'Subdivision of the sky hemisphere for luminance measurements'; Reinhart
+    /// 2001, for divisions in the form that the program `genskyvec` has.
+    pub fn patches(division: NonZeroU32) -> Self {
+        const IN_ROW: [u32; 7] = [30, 30, 24, 24, 18, 12, 6];
+        let division = division.get();
+        let height = FRAC_PI_2 / (7.0 * f64::from(division) + 0.5);
+        let mut directions = Vec::new();
+        let mut weights = Vec::new();
+        for row in 0..7 * division {
+            let count = IN_ROW[(row / division) as usize] * division;
+            let [low, high] = [row, row + 1].map(|row| libm::sin(f64::from(row) * height));
+            let (up, out) = libm::sincos((f64::from(row) + 0.5) * height);
+            for patch in 0..count {
+                let (east, north) = libm::sincos(TAU * f64::from(patch) / f64::from(count));
+                directions.push(DVec3::new(out * east, out * north, up));
+                weights.push(2.0 * (high - low) / f64::from(count));
+            }
+        }
+        directions.push(DVec3::Z);
+        weights.push(2.0 * (1.0 - libm::cos(0.5 * height)));
+        Self { directions, range: [0.0, f64::MAX], weights, columns: 1 }
+    }
+
+    /// Returns `count` directions of the sky, as [`patches`](Self::patches) are, each of the same
+    /// solid angle, on a spiral of golden angles.
+    pub fn uniform(count: u32) -> Self {
+        let golden = PI * (3.0 - 5.0f64.sqrt());
+        let direction = |number: u32| {
+            let up = (f64::from(number) + 0.5) / f64::from(count);
+            let out = (1.0 - up * up).sqrt();
+            let (east, north) = libm::sincos(golden * f64::from(number));
+            DVec3::new(out * east, out * north, up)
+        };
+        let directions = (0..count).map(direction).collect();
+        let weights = vec![2.0 / f64::from(count); count as usize];
+        Self { directions, range: [0.0, f64::MAX], weights, columns: 1 }
+    }
+
+    /// Sets the range: `range[0] <= t <= range[1]` in multiples of the directions' lengths.
+    pub fn with_range(self, range: [f64; 2]) -> Result<Self, InvalidSky> {
         let [begin, end] = range;
         if !(begin >= 0.0 && !end.is_nan()) {
             return Err(InvalidSky::Range(begin, end));
         }
-        let weights = vec![1.0; directions.len()];
-        Ok(Self { directions, range: [begin, end.min(f64::MAX)], weights, columns: 1 })
+        Ok(Self { range: [begin, end.min(f64::MAX)], ..self })
     }
 
     /// Sets the weights: a row of as many numbers for each direction.
