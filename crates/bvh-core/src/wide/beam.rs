@@ -181,9 +181,9 @@ struct Group<K: Instructions> {
     /// The largest relative coordinates.
     half: Vec3,
     relative: [[K::Rays; 3]; VECTORS],
-    /// As boxes are tested with them, and their extremes.
+    /// As boxes are tested with them, and the extremes of each vector.
     origins: [[K::Rays; 3]; VECTORS],
-    bounds: Aabb,
+    bounds: [Aabb; VECTORS],
     /// The number of vectors.
     count: usize,
 }
@@ -210,9 +210,12 @@ impl<K: Instructions> Group<K> {
                 half: (half * scale).as_vec3() * (1.0 + 2.0 * f32::EPSILON),
                 relative: none,
                 origins: none,
-                bounds: Aabb::around(origins.iter().copied()),
+                bounds: [Aabb::EMPTY; VECTORS],
                 count,
             };
+            for (vector, origins) in origins.chunks(K::Rays::N).enumerate() {
+                group.bounds[vector] = Aabb::around(origins.iter().copied());
+            }
             for vector in 0..count {
                 for axis in 0..3 {
                     let mut lanes = Aligned([[0.0; 16]; 2]);
@@ -345,7 +348,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
         let wide = self.beams.obstacles.boxes();
         // SAFETY: the processor has the instructions; references are sound, and the stack has room.
         unsafe {
-            let intervals = Intervals::<K>::new(&self.boxed, &self.group.bounds);
+            let intervals = Intervals::<K>::new(&self.boxed, &self.group.bounds, self.group.count);
             let mut top = base;
             let mut child = root;
             if !child.is_node() {
@@ -354,13 +357,13 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
             }
             loop {
                 let node = &*wide.nodes.as_ptr().add(child.index());
-                let mask = intervals.enter(node);
+                let (masks, mask) = self.enter_children(node, &intervals);
                 let mut leaves = mask & K::Boxes::load(node.children.as_ptr().cast()).signs();
                 let inner = mask & !leaves;
                 while leaves != 0 {
                     let lane = leaves.trailing_zeros() as usize & 7;
                     leaves &= leaves - 1;
-                    let (entered, is_entered) = self.enter(node, lane, &intervals);
+                    let (entered, is_entered) = self.enter(node, lane, &intervals, &masks);
                     let leaf = node.children.get_unchecked(lane).index();
                     if is_entered && self.visit_leaf(leaf, &entered) {
                         return;
@@ -379,14 +382,37 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
         }
     }
 
+    /// Returns for each vector a bit for each child of a node that some live ray of it may enter, and
+    /// a bit for each that any may.
+    #[inline(always)]
+    unsafe fn enter_children(
+        &self,
+        node: &WideNode,
+        intervals: &Intervals<K>,
+    ) -> ([u32; VECTORS], u32) {
+        let mut masks = [0; VECTORS];
+        let mut any = 0;
+        // SAFETY: the processor has the instructions.
+        unsafe {
+            for (vector, mask) in masks.iter_mut().enumerate().take(self.group.count) {
+                if self.live[vector] != 0 {
+                    *mask = intervals.enter(node, vector);
+                    any |= *mask;
+                }
+            }
+        }
+        (masks, any)
+    }
+
     /// Returns a bit for each live ray that enters the box of a node's child, and whether there are
-    /// any.
+    /// any. Only vectors whose mask has a bit for the child are tested.
     #[inline(always)]
     unsafe fn enter(
         &self,
         node: &WideNode,
         lane: usize,
         intervals: &Intervals<K>,
+        masks: &[u32; VECTORS],
     ) -> ([u32; VECTORS], bool) {
         let mut entered = [0; VECTORS];
         let mut any = 0;
@@ -394,6 +420,9 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
         unsafe {
             let lanes = node.planes.as_ptr().cast::<f32>().add(lane);
             for (vector, entered) in entered.iter_mut().enumerate().take(self.group.count) {
+                if masks[vector] >> lane & 1 == 0 {
+                    continue;
+                }
                 let mut entry = K::Rays::splat(self.boxed.t_min());
                 let mut exit = K::Rays::splat(self.boxed.t_max());
                 for axis in 0..3 {
@@ -541,7 +570,7 @@ impl Shadows {
         unsafe {
             let [x, y, z] = beam.axes;
             let scale = <K::Block as Lanes>::Double::splat(beam.group.scale);
-            let centre = beam.group.centre;
+            let centre = beam.group.centre * beam.group.scale;
             let middle =
                 [scale.filled(centre[x]), scale.filled(centre[y]), scale.filled(centre[z])];
             let slope = [scale.filled(beam.slope[0]), scale.filled(beam.slope[1])];
@@ -594,10 +623,11 @@ impl Shadows {
 /// Returns a corner relative to the middle of a beam, scaled and sheared.
 #[inline(always)]
 fn sheared<D: DoubleLanes>(corner: [D; 3], middle: [D; 3], scale: D, slope: [D; 2]) -> [D; 3] {
-    let z = (corner[2] - middle[2]) * scale;
+    // The products are exact.
+    let z = corner[2].mul_sub(scale, middle[2]);
     [
-        z.mul_add(slope[0], (corner[0] - middle[0]) * scale),
-        z.mul_add(slope[1], (corner[1] - middle[1]) * scale),
+        z.mul_add(slope[0], corner[0].mul_sub(scale, middle[0])),
+        z.mul_add(slope[1], corner[1].mul_sub(scale, middle[1])),
         z,
     ]
 }
@@ -627,22 +657,22 @@ unsafe fn write<L: Lanes>(
     x.abs().mul_add(hx, y.abs().mul_add(hy, constant.abs()))
 }
 
-/// The whole beam, as the children of nodes are tested with it.
+/// The vectors of a beam, as the children of nodes are tested with them.
 struct Intervals<K: Instructions> {
     /// The rows of the planes that the rays meet first, by axis, and of the planes opposite.
     near: [usize; 3],
     far: [usize; 3],
-    near_origin: [K::Boxes; 3],
-    far_origin: [K::Boxes; 3],
-    near_factor: [K::Boxes; 3],
-    far_factor: [K::Boxes; 3],
+    /// The origins of near and of far planes for the least distance to one and the greatest to the
+    /// other.
+    origins: [[[K::Boxes; 2]; 3]; VECTORS],
+    factors: [[K::Boxes; 2]; 3],
     begin: K::Boxes,
     end: K::Boxes,
 }
 
 impl<K: Instructions> Intervals<K> {
     #[inline(always)]
-    unsafe fn new(ray: &Ray, bounds: &Aabb) -> Self {
+    unsafe fn new(ray: &Ray, bounds: &[Aabb; VECTORS], count: usize) -> Self {
         let inverse = ray.inverse_direction();
         // SAFETY: the processor has the instructions.
         unsafe {
@@ -650,42 +680,44 @@ impl<K: Instructions> Intervals<K> {
             let mut intervals = Self {
                 near: [0; 3],
                 far: [0; 3],
-                near_origin: [none; 3],
-                far_origin: [none; 3],
-                near_factor: [none; 3],
-                far_factor: [none; 3],
+                origins: [[[none; 2]; 3]; VECTORS],
+                factors: [[none; 2]; 3],
                 begin: K::Boxes::splat(ray.t_min()),
                 end: K::Boxes::splat(ray.t_max()),
             };
             for axis in 0..3 {
                 let is_backwards = inverse[axis].is_sign_negative();
-                let (low, high) = (bounds.min[axis], bounds.max[axis]);
-                let (near, far) = if is_backwards { (low, high) } else { (high, low) };
                 intervals.near[axis] = axis + 3 * usize::from(is_backwards);
                 intervals.far[axis] = axis + 3 * usize::from(!is_backwards);
-                intervals.near_origin[axis] = K::Boxes::splat(near);
-                intervals.far_origin[axis] = K::Boxes::splat(far);
-                intervals.near_factor[axis] = K::Boxes::splat(inverse[axis] * NEAR);
-                intervals.far_factor[axis] = K::Boxes::splat(inverse[axis] * FAR);
+                for (bounds, origins) in bounds.iter().zip(&mut intervals.origins).take(count) {
+                    let (low, high) = (bounds.min[axis], bounds.max[axis]);
+                    let (near, far) = if is_backwards { (low, high) } else { (high, low) };
+                    origins[axis] = [K::Boxes::splat(near), K::Boxes::splat(far)];
+                }
+                let near = K::Boxes::splat(inverse[axis] * NEAR);
+                intervals.factors[axis] = [near, K::Boxes::splat(inverse[axis] * FAR)];
             }
             intervals
         }
     }
 
-    /// Returns a bit for each child of a node that some ray may enter.
+    /// Returns a bit for each child of a node that some ray of a vector may enter.
     #[inline(always)]
-    unsafe fn enter(&self, node: &WideNode) -> u32 {
+    unsafe fn enter(&self, node: &WideNode, vector: usize) -> u32 {
         let mut entry = self.begin;
         let mut exit = self.end;
-        // SAFETY: planes are whole and aligned.
+        // SAFETY: planes are whole and aligned; there is such a vector.
         unsafe {
             let planes = node.planes.as_ptr();
+            let origins = self.origins.get_unchecked(vector);
             for axis in 0..3 {
+                let [near_origin, far_origin] = origins[axis];
+                let [near_factor, far_factor] = self.factors[axis];
                 let near = K::Boxes::load(planes.add(self.near[axis]).cast());
                 let far = K::Boxes::load(planes.add(self.far[axis]).cast());
-                entry = entry.max((near - self.near_origin[axis]) * self.near_factor[axis]);
+                entry = entry.max((near - near_origin) * near_factor);
                 // `min` returns the second of a NaN and a number.
-                exit = ((far - self.far_origin[axis]) * self.far_factor[axis]).min(exit);
+                exit = ((far - far_origin) * far_factor).min(exit);
             }
         }
         entry.le(exit).bits()
