@@ -71,6 +71,11 @@ impl DRay {
     /// The greatest size of a direction's largest component.
     const LONG: f64 = (1u128 << 100) as f64;
 
+    /// Returns a point or a direction as it counts.
+    pub(crate) fn exact(point: DVec3) -> DVec3 {
+        point.map(|x| if x.abs() < Self::LEAST { 0.0 } else { x })
+    }
+
     /// Makes the ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in
     /// multiples of the direction's length, which need not be 1. Arrays `[f64; 3]` are accepted.
     ///
@@ -109,8 +114,7 @@ impl DRay {
         t_min: f64,
         t_max: f64,
     ) -> Result<[DVec3; 2], OutOfExactRange> {
-        let [origin, direction] =
-            [origin, direction].map(|p| p.map(|x| if x.abs() < Self::LEAST { 0.0 } else { x }));
+        let [origin, direction] = [origin, direction].map(Self::exact);
         if !is_exact(origin) {
             return Err(OutOfExactRange::Origin(origin));
         }

@@ -9,6 +9,7 @@
 //! [`winding`](crate::winding) finds the winding numbers of meshes that are not closed.
 
 use crate::exact::normal_sign;
+use crate::wide::Beams;
 use crate::winding::{Open, Winding};
 use crate::{Aabb, BvhView, Closest, Corners, DRay, DWideBvh, Ray, WideBvh};
 use core::cmp::Ordering;
@@ -190,6 +191,18 @@ pub trait Traced {
 
     /// Writes the closest point of every point.
     fn closest_to(&self, points: &[Self::Point], closest: &mut [Option<Closest>]);
+
+    /// Passes for each direction its number and a bit for each of at most 64 points from which it is
+    /// free over a range, and above the surface if there are normals.
+    #[doc(hidden)]
+    fn look(
+        &self,
+        points: &[Self::Point],
+        normals: Option<&[Self::Point]>,
+        directions: &[DVec3],
+        range: [f64; 2],
+        free: &mut dyn FnMut(usize, u64),
+    );
 }
 
 impl Traced for WideBvh {
@@ -219,6 +232,17 @@ impl Traced for WideBvh {
     fn closest_to(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
         self.closest_points(points, closest);
     }
+
+    fn look(
+        &self,
+        points: &[Vec3],
+        normals: Option<&[Vec3]>,
+        directions: &[DVec3],
+        range: [f64; 2],
+        free: &mut dyn FnMut(usize, u64),
+    ) {
+        Beams { obstacles: self, points, normals, directions, range }.trace(free);
+    }
 }
 
 impl Traced for DWideBvh {
@@ -242,6 +266,17 @@ impl Traced for DWideBvh {
 
     fn closest_to(&self, points: &[DVec3], closest: &mut [Option<Closest>]) {
         self.closest_points(points, closest);
+    }
+
+    fn look(
+        &self,
+        points: &[DVec3],
+        normals: Option<&[DVec3]>,
+        directions: &[DVec3],
+        range: [f64; 2],
+        free: &mut dyn FnMut(usize, u64),
+    ) {
+        Beams { obstacles: self, points, normals, directions, range }.trace(free);
     }
 }
 

@@ -202,7 +202,7 @@ impl Surface for DWideBvh {
     unsafe fn lanes<L: Lanes>(&self, block: &TriangleBlock) -> [Vector<L::Double>; 3] {
         let block = DoubleBlock::new(block, &self.triangles);
         // SAFETY: the processor has the instructions.
-        unsafe { [block.corner::<L>(0), block.corner::<L>(1), block.corner::<L>(2)] }
+        unsafe { block.corners_along::<L>([0, 1, 2]) }
     }
 }
 

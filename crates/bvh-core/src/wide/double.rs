@@ -59,8 +59,8 @@ pub struct DWideBvh {
 }
 
 /// A ray as the layout is traversed with it.
-struct Boxed {
-    ray: Ray,
+pub(super) struct Boxed {
+    pub(super) ray: Ray,
     ends: [DVec3; 2],
 }
 
@@ -176,7 +176,7 @@ impl DWideBvh {
     /// Returns the ray in the frame. Its direction has a largest component of about 1, so that f32
     /// has all distances within the scene.
     #[inline(always)]
-    fn boxed(&self, ray: &DRay) -> Boxed {
+    pub(super) fn boxed(&self, ray: &DRay) -> Boxed {
         let unit = ray.unit();
         let ends = [ray.origin, ray.direction * unit];
         let ray = self.frame.ray_of(ends, [single(ray.t_min, unit), single(ray.t_max, unit)]);

@@ -41,14 +41,15 @@ impl DoubleBlock {
         Self { corners }
     }
 
-    /// Returns one of the corners of each triangle.
+    /// Returns the corners of each triangle along these axes.
     ///
     /// # Safety
     /// As [`decide`](Self::decide).
     #[inline(always)]
-    pub(super) unsafe fn corner<L: Lanes>(&self, corner: usize) -> [L::Double; 3] {
+    pub(super) unsafe fn corners_along<L: Lanes>(&self, axes: [usize; 3]) -> [[L::Double; 3]; 3] {
+        let [a, b, c] = &self.corners;
         // SAFETY: the processor has the instructions.
-        unsafe { load::<L>(&self.corners[corner], [0, 1, 2]) }
+        unsafe { [load::<L>(a, axes), load::<L>(b, axes), load::<L>(c, axes)] }
     }
 
     /// Decides about those of the `possible` triangles that f64 suffices for.

@@ -7,6 +7,7 @@
 mod all_hits;
 mod answer;
 mod batch;
+mod beam;
 mod box_ray;
 mod build;
 mod closest;
@@ -21,6 +22,7 @@ mod instructions;
 mod kernel;
 mod lanes;
 mod layout;
+mod obstacles;
 mod one_ray;
 mod packet;
 mod packet_bounds;
@@ -45,6 +47,7 @@ mod triangles;
 mod vector;
 
 pub use batch::Coherence;
+pub(crate) use beam::{Beams, POINTS as POINTS_OF_BEAM};
 pub use closest::Closest;
 pub(crate) use decide::{BLOCK_COST, NODE_COST};
 pub use double::DWideBvh;

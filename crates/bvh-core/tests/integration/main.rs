@@ -9,6 +9,7 @@ mod file;
 mod instances;
 mod ray_density;
 mod references;
+mod sky;
 mod solid;
 mod support;
 mod traversal;

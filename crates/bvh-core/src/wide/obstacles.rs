@@ -1,0 +1,109 @@
+//! The layouts in f32 and in f64 as what stops beams.
+
+use super::beam::Obstacles;
+use super::double::DWideBvh;
+use super::double_block::DoubleBlock;
+use super::lanes::Lanes;
+use super::layout::WideBvh;
+use super::triangles::TriangleBlock;
+use crate::{DRay, PreparedRay, Ray, Select};
+use glam::{DVec3, Vec3};
+
+impl Obstacles for WideBvh {
+    type Point = Vec3;
+    type Ray = Ray;
+
+    fn boxes(&self) -> &WideBvh {
+        self
+    }
+
+    fn point(point: Vec3) -> DVec3 {
+        point.as_dvec3()
+    }
+
+    fn reach(&self, point: DVec3) -> f64 {
+        let [min, max] = [self.bounds.min, self.bounds.max].map(Vec3::as_dvec3);
+        (max - point).max(point - min).max_element()
+    }
+
+    fn ray(&self, point: Vec3, direction: DVec3, [t_min, t_max]: [f64; 2]) -> Ray {
+        Ray::assume_valid(point, direction.as_vec3(), t_min as f32, t_max as f32)
+    }
+
+    fn boxed(&self, ray: &Ray) -> Ray {
+        WideBvh::boxed(self, ray).0
+    }
+
+    #[inline(always)]
+    unsafe fn corners<L: Lanes>(
+        &self,
+        block: &TriangleBlock,
+        axes: [usize; 3],
+    ) -> [[L::Double; 3]; 3] {
+        // SAFETY: the processor has the instructions; these are rows.
+        let [a, b, c] = unsafe { block.corners_along::<L>(axes.map(|axis| axis * L::N)) };
+        [double(a), double(b), double(c)]
+    }
+
+    fn stops(&self, ray: &Ray, block: &TriangleBlock, lane: usize) -> bool {
+        let triangle = block.triangle(lane);
+        triangle.is_some_and(|(_, triangle)| {
+            triangle.intersect(&PreparedRay::new(ray), ray.t_max()).is_some()
+        })
+    }
+
+    fn is_stopped(&self, ray: &Ray) -> bool {
+        self.any_hit(ray)
+    }
+}
+
+#[inline(always)]
+fn double<L: Lanes>([x, y, z]: [L; 3]) -> [L::Double; 3] {
+    [x.double(), y.double(), z.double()]
+}
+
+impl Obstacles for DWideBvh {
+    type Point = DVec3;
+    type Ray = DRay;
+
+    fn boxes(&self) -> &WideBvh {
+        &self.wide
+    }
+
+    fn point(point: DVec3) -> DVec3 {
+        DRay::exact(point)
+    }
+
+    fn reach(&self, point: DVec3) -> f64 {
+        let size = self.wide.bounds.min.abs().max(self.wide.bounds.max.abs()).max_element();
+        // A point of the box is less than √3 of its size from the frame's centre.
+        (point - self.frame.centre()).abs().max_element() + 1.75 * f64::from(size)
+    }
+
+    fn ray(&self, point: DVec3, direction: DVec3, [t_min, t_max]: [f64; 2]) -> DRay {
+        DRay { origin: DRay::exact(point), direction, t_min, t_max }
+    }
+
+    fn boxed(&self, ray: &DRay) -> Ray {
+        DWideBvh::boxed(self, ray).ray
+    }
+
+    #[inline(always)]
+    unsafe fn corners<L: Lanes>(
+        &self,
+        block: &TriangleBlock,
+        axes: [usize; 3],
+    ) -> [[L::Double; 3]; 3] {
+        let block = DoubleBlock::new(block, &self.triangles);
+        // SAFETY: the processor has the instructions.
+        unsafe { block.corners_along::<L>(axes) }
+    }
+
+    fn stops(&self, ray: &DRay, block: &TriangleBlock, lane: usize) -> bool {
+        self.triangles[block.id(lane) as usize].intersect(ray).is_some()
+    }
+
+    fn is_stopped(&self, ray: &DRay) -> bool {
+        self.any_hit(ray, Select::default())
+    }
+}

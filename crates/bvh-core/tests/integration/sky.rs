@@ -1,0 +1,282 @@
+//! What points see of a sky: every pair of a point and a direction as one ray, on every kernel.
+
+use crate::support::{Random, SHAPES, ball, chain, grid_box, junction, soup, tree};
+use bvh_core::{
+    Bvh, DRay, DTriangle, DWideBvh, Frame, InFrame, InvalidSky, Kernel, Ray, Select, Sky, Triangle,
+    View, WideBvh, neighbours,
+};
+use core::num::NonZeroU32;
+use glam::{DMat3, DQuat, DVec3, Vec3};
+
+/// Returns points in general places, on faces, edges and corners, beside them, and far away.
+fn points(triangles: &[[DVec3; 3]], count: usize, random: &mut Random) -> Vec<DVec3> {
+    let corners = || triangles.iter().flatten().copied();
+    let min = corners().fold(DVec3::INFINITY, DVec3::min);
+    let size = (corners().fold(DVec3::NEG_INFINITY, DVec3::max) - min).max_element();
+    let mut points = Vec::new();
+    for number in 0..count {
+        let [a, b, c] = random.of(triangles);
+        let u = f64::from(random.unit());
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let far = if number % 64 == 63 { 1e4 } else { 1.0 };
+        points.push(match random.below(7) {
+            0 => a,
+            1 => a + (b - a) * u,
+            2 => (a + b + c) / 3.0,
+            3 => (a + b + c) / 3.0 + normal * size * 1e-6,
+            4 => a + normal * size * 0.01,
+            _ => min + (random.point().as_dvec3() + 0.5) * size * far,
+        });
+    }
+    points
+}
+
+/// Returns directions along axes, edges and normals, from points to corners, and any others.
+fn directions(triangles: &[[DVec3; 3]], points: &[DVec3], random: &mut Random) -> Vec<DVec3> {
+    let mut directions = vec![DVec3::X, -DVec3::Y, DVec3::Z * 1e-3, DVec3::new(1.0, -1.0, 1e-12)];
+    while directions.len() < 70 {
+        let [a, b, c] = random.of(triangles);
+        let direction = match random.below(5) {
+            0 => b - a,
+            1 => (b - a).cross(c - a),
+            2 => a - random.of(points),
+            3 => (a + b) * 0.5 - random.of(points),
+            _ => random.point().as_dvec3(),
+        };
+        let length = direction.length();
+        if length.is_normal() {
+            directions.push(direction / length);
+        }
+    }
+    directions
+}
+
+/// A frame of a random rotation around a point.
+fn frame(centre: DVec3, random: &mut Random) -> Frame {
+    let turn = DQuat::from_axis_angle(random.point().as_dvec3().normalize(), 1.1);
+    Frame::new(DMat3::from_quat(turn), centre).unwrap()
+}
+
+fn shapes(random: &mut Random) -> [Vec<Triangle>; 4] {
+    [soup(200, random), ball(3), grid_box(5), junction()]
+}
+
+/// The tree over boxes in a frame: a chain now and then, which is as deep as it can be.
+fn any_tree(boxes: &[bvh_core::Aabb], frame: Option<Frame>, random: &mut Random) -> Bvh {
+    let bvh = match random.below(4) {
+        0 => chain(boxes),
+        _ => tree(boxes, random.of(&SHAPES), random),
+    };
+    Bvh { frame, ..bvh }
+}
+
+/// Returns whether a row says that a direction is free.
+fn is_free(row: &[u64], direction: usize) -> bool {
+    row[direction / 64] >> (direction % 64) & 1 != 0
+}
+
+#[test]
+fn a_direction_is_free_where_a_ray_along_it_hits_nothing_on_every_kernel() {
+    let mut random = Random(70);
+    let mut counts = [0; 2];
+    for triangles in shapes(&mut random) {
+        for (size, offset) in [(1.0, 0.0), (1.0, 1e5), (1e-30, 0.0), (1e30, 0.0), (3e-42, 0.0)] {
+            let moved = |p: Vec3| (p * size) + Vec3::new(offset, -offset, 0.3 * offset);
+            let triangles: Vec<Triangle> =
+                triangles.iter().map(|t| Triangle(t.0.map(moved))).collect();
+            let corners: Vec<[DVec3; 3]> =
+                triangles.iter().map(|t| t.0.map(Vec3::as_dvec3)).collect();
+            let points = points(&corners, 150, &mut random);
+            let directions = directions(&corners, &points, &mut random);
+            let directions: Vec<DVec3> =
+                directions.into_iter().map(|d| d.as_vec3().as_dvec3()).collect();
+            let points: Vec<Vec3> = points.iter().map(|p| p.as_vec3()).collect();
+            let frames = [None, Some(frame(points[0].as_dvec3(), &mut random))];
+            for frame in frames {
+                let objects = InFrame { triangles: &triangles, frame: frame.as_ref() };
+                let tree = any_tree(&objects.boxes(), frame, &mut random);
+                let wide = WideBvh::new(&tree, &triangles).unwrap();
+                let t = f64::from(size * random.unit());
+                let range = random.of(&[[0.0, f64::INFINITY], [0.0, t], [t * 0.1, t], [t, 1e38]]);
+                let sky = Sky::new(directions.clone(), range).unwrap();
+                let view = View { points: &points, normals: None };
+                for kernel in Kernel::ALL {
+                    let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
+                    let order = neighbours(&wide, &points);
+                    let mut free = vec![0; points.len() * sky.words()];
+                    sky.visible(&wide, view, &order, &mut free);
+                    for (row, &number) in free.chunks_exact(sky.words()).zip(&order) {
+                        for (place, direction) in directions.iter().enumerate() {
+                            let [t_min, t_max] = range.map(|t| t as f32);
+                            let origin = points[number as usize];
+                            let ray = Ray::new(origin, direction.as_vec3(), t_min, t_max).unwrap();
+                            let free = is_free(row, place);
+                            assert_eq!(free, !wide.any_hit(&ray), "{kernel:?} {ray:?}");
+                            counts[usize::from(free)] += 1;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(counts[0] > 100_000 && counts[1] > 100_000, "{counts:?}");
+}
+
+#[test]
+fn a_direction_is_free_in_f64_where_a_ray_along_it_hits_nothing_on_every_kernel() {
+    let mut random = Random(71);
+    let mut counts = [0; 2];
+    for triangles in shapes(&mut random) {
+        for (size, offset) in [(1.0, 0.0), (1.0, 1e7), (1e-30, 0.0), (1e30, 0.0)] {
+            let moved =
+                |p: Vec3| p.as_dvec3() * 1.1 * size + DVec3::new(offset, -offset, 0.3 * offset);
+            let triangles: Vec<DTriangle> =
+                triangles.iter().map(|t| DTriangle(t.0.map(moved))).collect();
+            let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.0).collect();
+            let points = points(&corners, 150, &mut random);
+            let directions = directions(&corners, &points, &mut random);
+            let frame = match random.below(2) {
+                0 => frame(points[0], &mut random),
+                _ => DWideBvh::centred(&triangles),
+            };
+            let tree = any_tree(&DWideBvh::boxes(&triangles, &frame), Some(frame), &mut random);
+            let wide = DWideBvh::new(&tree, &triangles).unwrap();
+            let t = size * f64::from(random.unit());
+            let range = random.of(&[[0.0, f64::INFINITY], [0.0, t], [t * 0.1, t]]);
+            let sky = Sky::new(directions.clone(), range).unwrap();
+            let view = View { points: &points, normals: None };
+            for kernel in Kernel::ALL {
+                let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
+                let order = neighbours(&wide, &points);
+                let mut free = vec![0; points.len() * sky.words()];
+                sky.visible(&wide, view, &order, &mut free);
+                for (row, &number) in free.chunks_exact(sky.words()).zip(&order) {
+                    for (place, &direction) in directions.iter().enumerate() {
+                        let origin = points[number as usize];
+                        let ray = DRay::new(origin, direction, range[0], range[1]).unwrap();
+                        let free = is_free(row, place);
+                        let is_hit = wide.any_hit(&ray, Select::default());
+                        assert_eq!(free, !is_hit, "{kernel:?} {ray:?}");
+                        counts[usize::from(free)] += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(counts[0] > 100_000 && counts[1] > 100_000, "{counts:?}");
+}
+
+/// A layout of triangles along the axes of the file.
+fn laid(triangles: &[Triangle]) -> WideBvh {
+    let boxes = bvh_core::boxes(triangles);
+    WideBvh::new(&tree(&boxes, SHAPES[1], &mut Random(1)), triangles).unwrap()
+}
+
+#[test]
+fn with_normals_directions_below_the_surface_are_not_free_and_cosines_weigh() {
+    let triangles = [Triangle::from([[0.0, 0.0, 9.0], [1.0, 0.0, 9.0], [0.0, 1.0, 9.0]])];
+    let wide = laid(&triangles);
+    let down = DVec3::new(0.0, 3.0, -4.0);
+    let up = DVec3::new(3.0, 0.0, 4.0);
+    let sky = Sky::new(vec![up, down, DVec3::X], [0.0, f64::INFINITY]).unwrap();
+    let sky = sky.with_weights(vec![1.0, 10.0, 2.0, 20.0, 4.0, 40.0]).unwrap();
+    let points = [Vec3::ZERO; 2];
+    let normals = [Vec3::Z * 5.0, -Vec3::Z];
+    let mut free = [0; 2];
+    sky.visible(&wide, View { points: &points, normals: Some(&normals) }, &[1, 0], &mut free);
+    assert_eq!(free, [0b010, 0b001]);
+    assert_eq!(sky.sums(&free[..1], None), [2.0, 20.0]);
+    assert_eq!(sky.sums(&free[1..], Some(normals[0].as_dvec3())), [0.8, 8.0]);
+    sky.visible(&wide, View { points: &points, normals: None }, &[0, 1], &mut free);
+    assert_eq!(free, [0b111; 2]);
+    assert_eq!(sky.sums(&free[..1], None), [7.0, 70.0]);
+}
+
+#[test]
+fn the_view_of_the_sky_from_a_canyon_is_that_of_its_formula() {
+    // Two long walls of height 1 at a distance of 2; the middle of the street sees the angles
+    // between their upper edges.
+    let length = 1e4;
+    let wall = |x: f32| {
+        let [a, b] = [-length, length];
+        [[[x, a, 0.0], [x, b, 0.0], [x, b, 1.0]], [[x, a, 0.0], [x, b, 1.0], [x, a, 1.0]]]
+    };
+    let walls: Vec<Triangle> = [-1.0, 1.0].into_iter().flat_map(wall).map(Triangle::from).collect();
+    let wide = laid(&walls);
+    // Directions of equal weight by the cosine law: points of the unit disk, lifted.
+    let side = 400;
+    let grid = (0..side * side)
+        .map(|i| [i / side, i % side].map(|k| 2.0 * (k as f64 + 0.5) / side as f64 - 1.0));
+    let directions: Vec<DVec3> = grid
+        .filter(|[x, y]| x * x + y * y < 1.0)
+        .map(|[x, y]| DVec3::new(x, y, (1.0 - x * x - y * y).sqrt()))
+        .collect();
+    let count = directions.len() as f64;
+    let sky = Sky::new(directions, [0.0, f64::INFINITY]).unwrap();
+    let xs = [-0.9, -0.5, 0.0, 0.7f32];
+    let points = xs.map(|x| Vec3::new(x, 0.0, 0.0));
+    let order = neighbours(&wide, &points);
+    let mut free = vec![0; points.len() * sky.words()];
+    sky.visible(&wide, View { points: &points, normals: Some(&[Vec3::Z; 4]) }, &order, &mut free);
+    for (row, point) in free.chunks(sky.words()).zip(order) {
+        let x = f64::from(xs[point as usize]);
+        let sine = |distance: f64| distance / distance.hypot(1.0);
+        let formula = (sine(1.0 - x) + sine(1.0 + x)) / 2.0;
+        let seen = sky.sums(row, None)[0] / count;
+        assert!((seen - formula).abs() < 0.002, "{x}: {seen} {formula}");
+    }
+}
+
+#[test]
+fn built_in_skies_cover_the_hemisphere_and_weigh_a_free_view_as_one() {
+    let patches = |division| Sky::patches(NonZeroU32::new(division).unwrap());
+    for (sky, count, error) in [
+        (patches(1), 145, 1e-2),
+        (patches(2), 577, 3e-3),
+        (patches(4), 2305, 1e-3),
+        (Sky::uniform(1000), 1000, 1e-6),
+    ] {
+        assert_eq!(sky.directions().len(), count);
+        let all = vec![u64::MAX; sky.words()];
+        let solid_angle = sky.sums(&all, None)[0];
+        assert!((solid_angle - 2.0).abs() < 1e-12, "{count}: {solid_angle}");
+        let view = sky.sums(&all, Some(DVec3::Z))[0];
+        assert!((view - 1.0).abs() < error, "{count}: {view}");
+        let middle: DVec3 = sky.directions().iter().sum();
+        assert!(middle.truncate().length() < 1e-2 * middle.z, "{count}: {middle}");
+    }
+}
+
+#[test]
+fn neighbours_are_a_permutation_of_any_points() {
+    let wide = laid(&grid_box(1));
+    let mut random = Random(7);
+    for count in [0, 1, 15, 16, 17, 63, 64, 65, 1000] {
+        for is_one_place in [false, true] {
+            let place = |_| if is_one_place { Vec3::ONE } else { random.point() };
+            let points: Vec<Vec3> = (0..count).map(place).collect();
+            let mut order = neighbours(&wide, &points);
+            order.sort_unstable();
+            assert!(order.into_iter().eq(0..count as u32));
+        }
+    }
+}
+
+#[test]
+fn invalid_skies_are_rejected_with_their_fault() {
+    let up = || vec![DVec3::Z];
+    for bad in [DVec3::ZERO, DVec3::NAN, DVec3::X * 1e40] {
+        let rejected = Sky::new(vec![DVec3::Z, bad], [0.0, 1.0]);
+        assert!(matches!(rejected, Err(InvalidSky::Direction { index: 1, .. })), "{bad}");
+    }
+    for range in [[-1.0, 1.0], [f64::NAN, 1.0], [0.0, f64::NAN]] {
+        assert!(matches!(Sky::new(up(), range), Err(InvalidSky::Range(..))), "{range:?}");
+    }
+    let sky = Sky::new(vec![DVec3::Z; 2], [0.0, 1.0]).unwrap();
+    for count in [0, 1, 3] {
+        let rejected = sky.clone().with_weights(vec![1.0; count]);
+        assert!(matches!(rejected, Err(InvalidSky::Weights { .. })), "{count}");
+    }
+    let rejected = sky.with_weights(vec![1.0, f64::NAN]);
+    assert!(matches!(rejected, Err(InvalidSky::Weight(1, _))));
+}
