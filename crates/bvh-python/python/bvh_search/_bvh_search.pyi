@@ -390,13 +390,13 @@ def sky(patches: int | None = None, *, uniform: int | None = None) -> tuple[NDAr
     `Tracer.visible` then returns sky view factors, 1 for a free horizontal surface.
 
     `patches` are the middles of the 145 patches of Tregenza, the default, or of the 577, 1297 and so
-    on, 144 k² + 1, into which Reinhart divides them, in rows from the horizon to the zenith, from north over east.
-    `uniform` directions have the same solid angle each.
+    on, 144 k² + 1, into which Reinhart divides them, in rows from the horizon to the zenith, from
+    north over east. `uniform` directions have the same solid angle each.
 
     >>> from bvh_search import sky
     >>> directions, weights = sky(patches=145)
     >>> directions[0].round(3), float(weights.sum().round(9))
-    (array([0.   , 0.995, 0.104]), 2.0)
+    (array([0.   , 0.995, 0.105]), 2.0)
     """
 def rows(name: str, argument: Numbers, length: int) -> NDArray[Any]:
     """Converts the argument called `name` to `float32` or `float64` and checks that its last axis has
