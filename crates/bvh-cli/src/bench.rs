@@ -79,7 +79,7 @@ pub fn bench(args: &BenchArgs, answer: &mut Answer) -> Result<(), Error> {
 }
 
 /// Reads the tree in a file, and lays it out as its search assumed.
-fn layout(path: &Path, scene: &Scene, triangles: &[Triangle]) -> Result<WideBvh, Error> {
+pub fn layout(path: &Path, scene: &Scene, triangles: &[Triangle]) -> Result<WideBvh, Error> {
     let bytes = tree_file::read(path)?;
     let read = || {
         let file = TreeFile::open(&bytes)?.for_boxes(&scene.boxes)?;

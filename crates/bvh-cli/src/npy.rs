@@ -1,12 +1,13 @@
-//! Recorded rays as an array that `numpy.save` wrote.
+//! Recorded rays and points as an array that `numpy.save` wrote.
 
-/// Returns the numbers of an array of shape (n, 6) or (n, 2, 3), `float32` or `float64`. Doubles are
+/// Returns the numbers of an array, `float32` or `float64`, and how many are in a row: of shape
+/// (n, `width`) for one of the `widths`, and also (n, 2, 3) where six are accepted. Doubles are
 /// rounded. The format is described in `numpy.lib.format`.
 ///
 /// # Errors
 ///
 /// Returns a message for bytes that are no such array, or less or more of it than its shape says.
-pub fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
+pub fn read_npy(bytes: &[u8], widths: &[usize]) -> Result<(usize, Vec<f32>), String> {
     let (header, data) = split(bytes).ok_or("the file is not an array of numpy")?;
     let rejected = |accepted: &str| Err(format!("the array is {header}; accepted: {accepted}"));
     let size = match header.split_once("'descr':'<f") {
@@ -14,20 +15,22 @@ pub fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
         Some((_, kind)) if kind.starts_with("8'") => size_of::<f64>(),
         _ => return rejected("float32 or float64"),
     };
-    let segments = match shape(&header).as_deref() {
-        Some(&[segments, 6] | &[segments, 2, 3]) if header.contains("'fortran_order':False") => {
-            segments
-        }
+    let is_in_rows = header.contains("'fortran_order':False");
+    let (rows, width) = match shape(&header).as_deref() {
+        Some(&[rows, width]) if is_in_rows && widths.contains(&width) => (rows, width),
+        Some(&[rows, 2, 3]) if is_in_rows && widths.contains(&6) => (rows, 6),
+        _ if widths.contains(&3) => return rejected("(n, 3), (n, 6) or (n, 2, 3) in row order"),
         _ => return rejected("(n, 6) or (n, 2, 3) in row order"),
     };
     // A copy that was cut off would otherwise train the tree for a part of its rays.
-    if segments.checked_mul(6 * size) != Some(data.len()) {
+    if rows.checked_mul(width * size) != Some(data.len()) {
         return Err(format!("the array is {header} and has {} bytes of data", data.len()));
     }
-    Ok(match size {
+    let numbers = match size {
         4 => data.as_chunks().0.iter().map(|&single| f32::from_le_bytes(single)).collect(),
         _ => data.as_chunks().0.iter().map(|&double| f64::from_le_bytes(double) as f32).collect(),
-    })
+    };
+    Ok((width, numbers))
 }
 
 /// Splits an array into its header, without spaces, and its data.
@@ -67,8 +70,10 @@ mod tests {
         let numbers = [1.0, 2.0, 3.0, 4.0, 5.0, -6.5f32];
         let single = numbers.map(f32::to_le_bytes).concat();
         let double = numbers.map(|x| f64::from(x).to_le_bytes()).concat();
-        assert_eq!(read_npy(&array("<f4", "(1, 6)", &single)).unwrap(), numbers);
-        assert_eq!(read_npy(&array("<f8", "(1, 2, 3)", &double)).unwrap(), numbers);
+        let read = |array: &[u8], widths| read_npy(array, widths).unwrap();
+        assert_eq!(read(&array("<f4", "(1, 6)", &single), &[6]), (6, numbers.to_vec()));
+        assert_eq!(read(&array("<f8", "(1, 2, 3)", &double), &[6]), (6, numbers.to_vec()));
+        assert_eq!(read(&array("<f4", "(2, 3)", &single), &[3, 6]), (3, numbers.to_vec()));
     }
 
     #[test]
@@ -82,7 +87,7 @@ mod tests {
             (array("<f4", "(1, 1, 6)", &[0; 24]), "accepted: (n, 6) or (n, 2, 3)"),
             (array("<f4", "(6,)", &[0; 24]), "accepted: (n, 6) or (n, 2, 3)"),
         ] {
-            let found = read_npy(&bytes).unwrap_err();
+            let found = read_npy(&bytes, &[6]).unwrap_err();
             assert!(found.contains(message), "{found}");
         }
     }

@@ -17,6 +17,7 @@ use bvh_core::Triangle;
 use document::{Document, Primitive, document, is_covered};
 use glam::{DMat4, DVec3, Vec3};
 use nodes::places;
+pub use orient::glb;
 pub(super) use orient::orient;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;

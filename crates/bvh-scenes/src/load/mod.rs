@@ -11,8 +11,10 @@ mod stl;
 mod text;
 
 use crate::files::{ReadError, read};
+pub use gltf::glb;
 use mesh::{Fault, Mesh};
 pub use orient::{Find, Oriented, orient};
+pub use ply::points;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 

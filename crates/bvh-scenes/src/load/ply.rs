@@ -1,4 +1,4 @@
-//! Triangles from PLY files, text or binary: the faces over the vertices.
+//! Triangles from PLY files, text or binary: the faces over the vertices; or the vertices as points.
 //!
 //! This module does not use `ply-rs-bw` 4.0.1, because that crate rejects blank lines, comments in
 //! Latin-1, lines that end in CR, elements without properties, and `-nan(ind)`; it reads an element
@@ -72,31 +72,8 @@ enum Encoding {
 
 /// Reads the bytes of a PLY file. O(bytes), and more for polygons that are not convex.
 pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let rest = without_mark(bytes);
-    let rounding = Rounding::default();
-    let mut file = File { rest, line: 0, words: &[], encoding: Encoding::Text, rounding };
-    let elements = file.header().map_err(|message| Fault::in_line(file.line, message))?;
-    let mut vertices = Vec::new();
-    // The indices of all faces, one face after the other, and the ends of the faces.
-    let (mut indices, mut ends) = (Vec::new(), Vec::new());
-    for Element { name, count, properties } in &elements {
-        // An element without properties has no bytes, whatever its count.
-        for number in 0..if properties.is_empty() { 0 } else { *count } {
-            let mut point = [f32::NAN; 3];
-            file.element(properties, &mut point, &mut indices).map_err(|message| {
-                let name = format!("{name} {number}, counted from 0");
-                match file.encoding {
-                    Encoding::Text => Fault::in_line(file.line, format!("{name}: {message}")),
-                    _ => Fault::of(&name, message),
-                }
-            })?;
-            match name.as_str() {
-                "vertex" => vertices.push(point),
-                "face" => ends.push(indices.len()),
-                _ => {}
-            }
-        }
-    }
+    let mut file = File::new(bytes, &AXES[..3]);
+    let Elements { vertices, indices, ends, .. } = file.elements()?;
     let mut polygons = Polygons::new(&vertices);
     let starts = [0].iter().chain(&ends);
     for (number, (&start, &end)) in starts.zip(&ends).enumerate() {
@@ -116,6 +93,27 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     Ok(Mesh::new(triangles, remarks))
 }
 
+/// Reads the vertices of a PLY file, rounded to single precision, and their normals if it has
+/// `nx`, `ny` and `nz`. O(bytes).
+pub fn points(bytes: &[u8]) -> Result<(Vec<[f32; 3]>, Option<Vec<[f32; 3]>>), Fault> {
+    let Elements { vertices, normals, .. } = File::new(bytes, &AXES).elements()?;
+    Ok((vertices, (!normals.is_empty()).then_some(normals)))
+}
+
+const AXES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
+
+/// The contents of a file.
+#[derive(Default)]
+struct Elements {
+    vertices: Vec<[f32; 3]>,
+    /// Empty if the vertices have none.
+    normals: Vec<[f32; 3]>,
+    /// The vertices of all faces, one face after the other.
+    indices: Vec<i64>,
+    /// The ends of the faces.
+    ends: Vec<usize>,
+}
+
 /// The part of a file that is not read yet.
 struct File<'a> {
     rest: &'a [u8],
@@ -125,9 +123,44 @@ struct File<'a> {
     words: &'a [u8],
     encoding: Encoding,
     rounding: Rounding,
+    /// The properties of a vertex that are read. Those of meshes may have anything as normals.
+    axes: &'static [&'static str],
 }
 
 impl<'a> File<'a> {
+    fn new(bytes: &'a [u8], axes: &'static [&'static str]) -> Self {
+        let (rest, rounding) = (without_mark(bytes), Rounding::default());
+        Self { rest, line: 0, words: &[], encoding: Encoding::Text, rounding, axes }
+    }
+
+    /// Reads the header and all elements.
+    fn elements(&mut self) -> Result<Elements, Fault> {
+        let elements = self.header().map_err(|message| Fault::in_line(self.line, message))?;
+        let mut read = Elements::default();
+        for Element { name, count, properties } in &elements {
+            let has_normals = properties.iter().any(|p| matches!(p.purpose, Purpose::Axis(3..)));
+            // An element without properties has no bytes, whatever its count.
+            for number in 0..if properties.is_empty() { 0 } else { *count } {
+                let mut axes = [f32::NAN; 6];
+                self.element(properties, &mut axes, &mut read.indices).map_err(|message| {
+                    let name = format!("{name} {number}, counted from 0");
+                    match self.encoding {
+                        Encoding::Text => Fault::in_line(self.line, format!("{name}: {message}")),
+                        _ => Fault::of(&name, message),
+                    }
+                })?;
+                let [x, y, z, normal @ ..] = axes;
+                match name.as_str() {
+                    "vertex" => read.vertices.push([x, y, z]),
+                    "face" => read.ends.push(read.indices.len()),
+                    _ => {}
+                }
+                read.normals.extend(has_normals.then_some(normal));
+            }
+        }
+        Ok(read)
+    }
+
     /// Reads the header, and everything up to the first byte of the first element.
     fn header(&mut self) -> Result<Vec<Element>, String> {
         // Only in a file whose lines end in CR alone may the body begin with LF.
@@ -174,7 +207,7 @@ impl<'a> File<'a> {
                 }
                 ["property", ref type_ @ .., name] => {
                     let Some(element) = elements.last_mut() else { return Err(unexpected(line)) };
-                    element.add(type_, name)?;
+                    element.add(type_, name, self.axes)?;
                 }
                 ["end_header"] => {
                     if ends_in_cr {
@@ -194,7 +227,7 @@ impl<'a> File<'a> {
     fn element(
         &mut self,
         properties: &[Property],
-        point: &mut [f32; 3],
+        axes: &mut [f32; 6],
         indices: &mut Vec<i64>,
     ) -> Result<(), String> {
         while self.encoding == Encoding::Text && self.words.is_empty() {
@@ -214,7 +247,7 @@ impl<'a> File<'a> {
                 match property.purpose {
                     Purpose::Ignored => self.skip(property.scalar),
                     Purpose::Axis(axis) => {
-                        self.float(property.scalar).map(|number| point[axis] = number)
+                        self.float(property.scalar).map(|number| axes[axis] = number)
                     }
                     Purpose::Indices => {
                         self.integer(property.scalar).map(|index| indices.push(index))
@@ -294,11 +327,11 @@ impl<'a> File<'a> {
 const ENDS: &str = "the file ends here; expected the elements of the header";
 
 impl Element {
-    fn add(&mut self, types: &[&str], name: &str) -> Result<(), String> {
+    fn add(&mut self, types: &[&str], name: &str, axes: &[&str]) -> Result<(), String> {
         if self.properties.iter().any(|property| property.name == name) {
             return Err(format!("property `{name}` repeats a name; expected each once"));
         }
-        let axis = ["x", "y", "z"].iter().position(|axis| *axis == name);
+        let axis = axes.iter().position(|axis| *axis == name);
         let purpose = match (self.name.as_str(), axis) {
             ("vertex", Some(axis)) => Purpose::Axis(axis),
             ("face", _) if matches!(name, "vertex_indices" | "vertex_index") => Purpose::Indices,
@@ -328,7 +361,7 @@ impl Element {
     /// Rejects an element without the properties that make it a vertex or a face.
     fn check(&self) -> Result<(), String> {
         let (needed, names) = match self.name.as_str() {
-            "vertex" => (3, "x, y and z"),
+            "vertex" => (3, "x, y and z, and nx, ny and nz if any of them"),
             "face" => (1, "vertex_indices"),
             "tristrips" if self.count > 0 => {
                 return Err("element tristrips; expected faces instead".into());
@@ -336,7 +369,8 @@ impl Element {
             _ => (0, ""),
         };
         let has = self.properties.iter().filter(|property| property.purpose != Purpose::Ignored);
-        match self.count > 0 && has.count() != needed {
+        let has = has.count();
+        match self.count > 0 && has != needed && !(self.name == "vertex" && has == AXES.len()) {
             true => Err(format!("element {} has other properties; expected {names}", self.name)),
             false => Ok(()),
         }
