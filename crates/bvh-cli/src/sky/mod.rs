@@ -91,8 +91,8 @@ pub struct SkyArgs {
     /// The column that colours show. The default is the first one.
     #[arg(long, value_name = "NAME")]
     pub column: Option<String>,
-    /// A saved tree of the scene. Otherwise a search takes a tenth of the time that the rays will
-    /// take, ten seconds at most. It changes only the time.
+    /// A saved tree of the scene. Otherwise a search takes a twentieth of the time that the rays
+    /// will take, five seconds at most. It changes only the time.
     #[arg(long, value_name = "FILE.bvh")]
     pub tree: Option<PathBuf>,
     #[command(flatten)]
@@ -319,7 +319,7 @@ impl SkyArgs {
         /// Rays a second of one thread, more or less.
         const SPEED: f64 = 5e6;
         let seconds = rays as f64 / (SPEED * rayon::current_num_threads() as f64);
-        let deadline = Deadline::after(Duration::from_secs_f64((0.1 * seconds).min(10.0)));
+        let deadline = Deadline::after(Duration::from_secs_f64((0.05 * seconds).min(5.0)));
         let objects = Objects::Shapes(scene.primitives.clone());
         let tree = OwnedTree::find(objects, &Options::default(), &deadline);
         let tree = tree.map_err(|error| match error {
