@@ -174,7 +174,7 @@ impl Sky {
     /// Sets the range: `range[0] <= t <= range[1]` in multiples of the directions' lengths.
     pub fn with_range(self, range: [f64; 2]) -> Result<Self, InvalidSky> {
         let [begin, end] = range;
-        if !(begin >= 0.0 && !end.is_nan()) {
+        if begin.is_nan() || begin < 0.0 || end.is_nan() {
             return Err(InvalidSky::Range(begin, end));
         }
         Ok(Self { range: [begin, end.min(f64::MAX)], ..self })

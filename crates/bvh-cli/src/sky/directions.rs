@@ -67,7 +67,7 @@ pub fn date(text: &str) -> Result<Date, String> {
 
 /// Parses the minutes between positions of the sun.
 pub fn step(text: &str) -> Result<u32, String> {
-    let step = text.parse().ok().filter(|step| *step > 0 && MINUTES % step == 0);
+    let step = text.parse().ok().filter(|step| *step > 0 && MINUTES.is_multiple_of(*step));
     step.ok_or_else(|| format!("accepted: whole minutes that divide {MINUTES}, a day"))
 }
 

@@ -108,10 +108,10 @@ impl Points {
         let bytes = read(path)?;
         let (at, normals) = match path.extension().and_then(|extension| extension.to_str()) {
             Some("ply") => {
-                let (at, normals) = load::points(&bytes)
+                let vectors = load::points(&bytes)
                     .map_err(|fault| Error::Usage(format!("{}{fault}", path.display())))?;
-                let vectors = |from: Vec<[f32; 3]>| from.into_iter().map(Vec3::from).collect();
-                (vectors(at), normals.map(vectors))
+                let [at, normals] = vectors.map(|from| from.into_iter().map(Vec3::from).collect());
+                (at, Some(normals).filter(|normals: &Vec<Vec3>| !normals.is_empty()))
             }
             Some("npy") => of_rows(read_npy(&bytes, &[3, 6]).map_err(invalid)?),
             Some("csv") => {

@@ -93,11 +93,11 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     Ok(Mesh::new(triangles, remarks))
 }
 
-/// Reads the vertices of a PLY file, rounded to single precision, and their normals if it has
-/// `nx`, `ny` and `nz`. O(bytes).
-pub fn points(bytes: &[u8]) -> Result<(Vec<[f32; 3]>, Option<Vec<[f32; 3]>>), Fault> {
+/// Reads the vertices of a PLY file, rounded to single precision, and as many normals if it has
+/// `nx`, `ny` and `nz`, or none. O(bytes).
+pub fn points(bytes: &[u8]) -> Result<[Vec<[f32; 3]>; 2], Fault> {
     let Elements { vertices, normals, .. } = File::new(bytes, &AXES).elements()?;
-    Ok((vertices, (!normals.is_empty()).then_some(normals)))
+    Ok([vertices, normals])
 }
 
 const AXES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
