@@ -163,7 +163,7 @@ static size_t visible(void) {
     const size_t words = (DIRECTIONS + 63) / 64;
     uint64_t *bits = malloc(point_count * words * sizeof *bits);
     size_t free_count = 0;
-    if (bvs_tracer_visible(tracer, &sky, points[0], NULL, point_count, bits, NULL) != BVS_OK) puts(bvs_last_error()), exit(EXIT_FAILURE);
+    if (bvs_tracer_visible(tracer, &sky, points[0], NULL, point_count, bits, NULL)) puts(bvs_last_error()), exit(EXIT_FAILURE);
     for (size_t i = 0; i < point_count * words; i++) free_count += (size_t)__builtin_popcountll(bits[i]);
     free(bits);
     return free_count;
