@@ -39,6 +39,11 @@
 //! for one that is subnormal, which is off by 2⁻¹⁵⁰. No relative coordinate is larger than 2, and so ends beyond 16 are as good as 16.
 //!
 //! Rays that are left open are traced by themselves, against that triangle alone.
+//!
+//! # Far apart
+//!
+//! Where the points of a beam are so far apart that it meets many triangles that no ray does, rays
+//! one by one take less work. The first beams tell.
 
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{Kernel, SPARE, STACK, deep_stacks};
@@ -91,8 +96,8 @@ pub(crate) trait Obstacles {
     /// Returns whether the triangle in a lane of a block stops a ray.
     fn stops(&self, ray: &Self::Ray, block: &TriangleBlock, lane: usize) -> bool;
 
-    /// Returns whether anything stops a ray.
-    fn is_stopped(&self, ray: &Self::Ray) -> bool;
+    /// Writes whether anything stops each ray.
+    fn are_stopped(&self, rays: &[Self::Ray], stopped: &mut [bool]);
 }
 
 /// Neighbouring points, and the directions in which they look.
@@ -108,7 +113,8 @@ pub(crate) struct Beams<'a, O: Obstacles> {
 
 impl<O: Obstacles> Beams<'_, O> {
     /// Passes for each direction its number and a bit for each point from which it is free.
-    pub(crate) fn trace(&self, mut free: impl FnMut(usize, u64)) {
+    pub(crate) fn trace(&self, free: &mut dyn FnMut(usize, u64)) {
+        let numbers = spread(self.directions.len());
         let wide = self.obstacles.boxes();
         let boxed = |&point: &O::Point| {
             let ray = self.obstacles.ray(point, DVec3::X, self.range);
@@ -116,19 +122,33 @@ impl<O: Obstacles> Beams<'_, O> {
         };
         let origins: Vec<Vec3> = self.points.iter().map(boxed).collect();
         let is_near = wide.near_box().contains(&Aabb::around(origins.iter().copied()));
-        if wide.kernel != Kernel::Portable && is_near {
-            let task = Trace { beams: self, origins: &origins, free: &mut free };
-            // SAFETY: a layout's kernel is available.
-            return unsafe { vector::dispatch(wide.kernel, task) };
+        if wide.kernel == Kernel::Portable || !is_near {
+            return self.trace_alone(&numbers, free);
         }
-        for (number, &direction) in self.directions.iter().enumerate() {
-            let mut bits = 0;
-            for (point, &from) in self.points.iter().enumerate() {
-                let ray = self.obstacles.ray(from, direction, self.range);
-                let is_free = self.is_above(point, direction) && !self.obstacles.is_stopped(&ray);
-                bits |= u64::from(is_free) << point;
+        let task = Trace { beams: self, origins: &origins, numbers: &numbers, free };
+        // SAFETY: a layout's kernel is available.
+        let traced = unsafe { vector::dispatch(wide.kernel, task) };
+        self.trace_alone(&numbers[traced..], free);
+    }
+
+    /// Traces ray by ray in the directions of these numbers.
+    fn trace_alone(&self, numbers: &[u32], free: &mut dyn FnMut(usize, u64)) {
+        /// Directions of one batch of rays, which pays if it is long.
+        const AT_ONCE: usize = 32;
+        let count = self.points.len();
+        for numbers in numbers.chunks(AT_ONCE) {
+            let ray = |&number: &u32| {
+                let direction = self.directions[number as usize];
+                self.points.iter().map(move |&from| self.obstacles.ray(from, direction, self.range))
+            };
+            let rays: Vec<O::Ray> = numbers.iter().flat_map(ray).collect();
+            let mut stopped = vec![false; rays.len()];
+            self.obstacles.are_stopped(&rays, &mut stopped);
+            for (&number, stopped) in numbers.iter().zip(stopped.chunks_exact(count)) {
+                let direction = self.directions[number as usize];
+                let is_free = |&point: &usize| !stopped[point] && self.is_above(point, direction);
+                free(number as usize, (0..count).filter(is_free).map(|point| 1 << point).sum());
             }
-            free(number, bits);
         }
     }
 
@@ -139,20 +159,44 @@ impl<O: Obstacles> Beams<'_, O> {
     }
 }
 
+/// Returns the numbers of directions in an order of which every beginning is spread over all of
+/// them: by steps of about the golden section.
+fn spread(count: usize) -> Vec<u32> {
+    let is_coprime = |&step: &usize| {
+        let (mut a, mut b) = (step, count);
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a == 1
+    };
+    let step = (count * 5 / 13..count).find(is_coprime).unwrap_or(1);
+    (0..count).map(|number| (number * step % count) as u32).collect()
+}
+
+/// The number of beams after which it is known whether single rays would take less work.
+const TRIALS: usize = 4;
+
+/// The work for each ray, about in cycles, from which on points are so far apart that their rays are
+/// traced one by one.
+const MOST_WORK: u64 = 330;
+
 /// The tracing of beams by a vector kernel.
-struct Trace<'a, O: Obstacles, F> {
+struct Trace<'a, O: Obstacles> {
     beams: &'a Beams<'a, O>,
     /// The points as boxes are tested with them.
     origins: &'a [Vec3],
-    free: &'a mut F,
+    /// The numbers of the directions.
+    numbers: &'a [u32],
+    free: &'a mut dyn FnMut(usize, u64),
 }
 
-impl<K: Instructions, O: Obstacles, F: FnMut(usize, u64)> Task<K> for Trace<'_, O, F> {
-    type Output = ();
+impl<K: Instructions, O: Obstacles> Task<K> for Trace<'_, O> {
+    /// The number of directions that were traced.
+    type Output = usize;
 
     #[inline(always)]
-    unsafe fn run(self) {
-        let Self { beams, origins, free } = self;
+    unsafe fn run(self) -> usize {
+        let Self { beams, origins, numbers, free } = self;
         let wide = beams.obstacles.boxes();
         // SAFETY: the processor has the instructions; the stack has room for `stack_need` children
         // and one register more.
@@ -162,13 +206,21 @@ impl<K: Instructions, O: Obstacles, F: FnMut(usize, u64)> Task<K> for Trace<'_, 
             let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
             let base =
                 deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
-            for (number, &direction) in beams.directions.iter().enumerate() {
+            let mut work = 0;
+            for (place, &number) in numbers.iter().enumerate() {
+                let most = MOST_WORK * (TRIALS * origins.len()) as u64;
+                if place == TRIALS && work > most {
+                    return place;
+                }
+                let direction = beams.directions[number as usize];
                 let mut beam = Beam::new(&group, beams, direction);
                 if let Some(root) = wide.root {
                     beam.traverse(root, base);
                 }
-                free(number, beam.free());
+                work += beam.work;
+                free(number as usize, beam.free());
             }
+            numbers.len()
         }
     }
 }
@@ -267,6 +319,8 @@ struct Beam<'a, K: Instructions, O: Obstacles> {
     factors: [[K::Rays; 2]; 3],
     /// A bit for each ray that nothing has stopped.
     live: [u32; VECTORS],
+    /// What was done, about in cycles.
+    work: u64,
 }
 
 impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
@@ -306,6 +360,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
                 points: [[none; 3]; VECTORS],
                 factors: [[none; 2]; 3],
                 live: [0; VECTORS],
+                work: 0,
             };
             for (axis, factors) in beam.factors.iter_mut().enumerate() {
                 let near = K::Rays::splat(inverse[axis] * NEAR);
@@ -358,12 +413,15 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
             loop {
                 let node = &*wide.nodes.as_ptr().add(child.index());
                 let (masks, mask) = self.enter_children(node, &intervals);
-                let mut leaves = mask & K::Boxes::load(node.children.as_ptr().cast()).signs();
-                let inner = mask & !leaves;
+                self.work += 20 + 12 * self.group.count as u64;
+                let is_leaf = K::Boxes::load(node.children.as_ptr().cast()).signs();
+                let mut leaves = mask & is_leaf;
+                let inner = mask & !is_leaf;
                 while leaves != 0 {
                     let lane = leaves.trailing_zeros() as usize & 7;
                     leaves &= leaves - 1;
                     let (entered, is_entered) = self.enter(node, lane, &intervals, &masks);
+                    self.work += 20 * self.group.count as u64;
                     let leaf = node.children.get_unchecked(lane).index();
                     if is_entered && self.visit_leaf(leaf, &entered) {
                         return;
@@ -467,12 +525,14 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
         // SAFETY: the processor has the instructions.
         unsafe {
             let shadows = Shadows::new(self, block);
+            self.work += 100;
             for lane in 0..block.len() {
                 for (vector, &entered) in entered.iter().enumerate().take(self.group.count) {
                     let live = self.live[vector] & entered;
                     if live == 0 {
                         continue;
                     }
+                    self.work += 20;
                     let (mut stopped, mut open) = self.test(&shadows, lane, vector, live);
                     while open != 0 {
                         let point = vector * K::Rays::N + open.trailing_zeros() as usize;

@@ -6,7 +6,7 @@ use super::double_block::DoubleBlock;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::triangles::TriangleBlock;
-use crate::{DRay, PreparedRay, Ray, Select};
+use crate::{Coherence, DRay, PreparedRay, Ray, Select};
 use glam::{DVec3, Vec3};
 
 impl Obstacles for WideBvh {
@@ -52,8 +52,8 @@ impl Obstacles for WideBvh {
         })
     }
 
-    fn is_stopped(&self, ray: &Ray) -> bool {
-        self.any_hit(ray)
+    fn are_stopped(&self, rays: &[Ray], stopped: &mut [bool]) {
+        self.any_hits(rays, stopped, Coherence::Incoherent);
     }
 }
 
@@ -103,7 +103,7 @@ impl Obstacles for DWideBvh {
         self.triangles[block.id(lane) as usize].intersect(ray).is_some()
     }
 
-    fn is_stopped(&self, ray: &DRay) -> bool {
-        self.any_hit(ray, Select::default())
+    fn are_stopped(&self, rays: &[DRay], stopped: &mut [bool]) {
+        self.any_hits(rays, Select::default(), stopped, Coherence::Incoherent);
     }
 }
