@@ -87,13 +87,20 @@ int main(void) {
     unsigned char inside;
     bvs_tracer_closest_points(tracer, point, 1, &closest);
     bvs_tracer_contains(tracer, point, 1, &inside);
+    /* From inside the sky is not to be seen; above the box its two directions are. */
+    float places[2][3] = {{0, 0, 0}, {0, 0, 6}};
+    double directions[2][3] = {{0, 0, 1}, {0, 1, 1}}, weights[2] = {1, 2}, hours[2];
+    BvsSky sky = {&directions[0][0], 2, 0, INFINITY, weights, 1, 0};
+    uint64_t free_bits[2];
+    bvs_tracer_visible(tracer, &sky, &places[0][0], NULL, 2, free_bits, hours);
     float at[3] = {0, 0, 0};
     double mean = lidar_scan(tracer, at);
     printf("audio %g and %g, crossings %u, closest %g, mean of the scan %g\n", hits[0].distance,
            hits[1].distance, count, closest.distance, mean);
     int is_right = hits[0].distance == 5 && fabsf(hits[0].normal[0]) == 1 && isinf(hits[1].distance) &&
                    occluded[0] == 1 && occluded[1] == 0 && total == 2 && all[0].t == 4 && all[1].t == 14 &&
-                   closest.distance == 1 && inside == 1 && mean > 5 && mean < 7;
+                   closest.distance == 1 && inside == 1 && free_bits[0] == 0 && free_bits[1] == 3 &&
+                   hours[0] == 0 && hours[1] == 3 && mean > 5 && mean < 7;
     bvs_tracer_free(tracer);
     bvs_tree_free(tree);
     return is_right ? EXIT_SUCCESS : EXIT_FAILURE;

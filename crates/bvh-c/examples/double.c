@@ -51,6 +51,11 @@ int main(void) {
     bvs_tracer_closest_points_f64(tracer, point, 1, &closest);
     bvs_tracer_contains_f64(tracer, point, 1, &inside);
     is_right = is_right && fabs(closest.distance - 0.1) < 1e-8 && inside == 1;
+    /* Beside the box, along x and z: with a normal, only the latter is above the surface. */
+    double beside[3] = {at[0] + 0.6, at[1], at[2]}, up[3] = {-0.1, 0, 1}, directions[2][3] = {{1, 0, 0}, {0, 0, 1}};
+    double seen = 0;
+    BvsSky sky = {.directions = &directions[0][0], .count = 2, .t_max = INFINITY};
+    is_right = is_right && bvs_tracer_visible_f64(tracer, &sky, beside, up, 1, NULL, &seen) == 0 && seen == 1;
     printf("in after %.9f, out after %.9f, closest %.9f\n", entry.t, exit.t, closest.distance);
     bvs_tracer_f64_free(tracer);
     bvs_tree_free(tree);

@@ -227,6 +227,26 @@ typedef struct {
     uint32_t triangle;
 } BvsInstanceHit;
 
+// Directions that many points look along, and what each is worth.
+typedef struct {
+    // 3 doubles for each direction, of any length except 0. A `BvsTracer` rounds them to floats.
+    const double *directions;
+    // The number of directions.
+    size_t count;
+    // The smallest distance, in multiples of a direction's length: 0 or more. A `BvsTracer` rounds
+    // both distances to floats.
+    double t_min;
+    // The largest distance; it may be infinite.
+    double t_max;
+    // `columns` doubles for each direction. Null makes every direction weigh 1, in one column.
+    const double *weights;
+    // The number of weights of each direction.
+    size_t columns;
+    // 1 if a weight counts by the cosine of the angle between its direction and the normal, 0 if
+    // it counts whole.
+    int32_t cosine;
+} BvsSky;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -495,6 +515,29 @@ BvsStatus bvs_instances_any_hits(const BvsInstances *scene, const BvsRay *rays, 
 //
 // `scene` is null, or a scene that nobody uses any more.
 void bvs_instances_free(BvsInstances *scene);
+
+// Writes what each of `count` points, 3 floats each, sees of a sky. A direction is free from a
+// point if a ray along it hits nothing, as `bvs_any` says.
+//
+// `bits`, unless it is null, gets the directions themselves: (`sky.count` + 63) / 64 words for each
+// point, in which direction j is free if bit j % 64 of word j / 64 is set. `sums`, unless it is
+// null, gets the sums of the free directions' weights: `sky.columns` doubles for each point, or
+// one without weights.
+//
+// `normals` are null, or 3 floats for each point: then directions d count as free only above the
+// surface, where the dot product of normal and d is greater than 0.
+//
+// `tracer` is a tracer; `sky` points to a sky whose arrays have the promised lengths; `points` and
+// `normals` point to 3 * `count` floats, unless `normals` is null; `bits` and `sums` point to as
+// many elements as they get.
+BvsStatus bvs_tracer_visible(const BvsTracer *tracer, const BvsSky *sky, const float *points, const float *normals, size_t count, uint64_t *bits, double *sums);
+
+// Writes what each of `count` points, 3 doubles each, sees of a sky, as `bvs_tracer_visible` does.
+//
+// `tracer` is a tracer; `sky` points to a sky whose arrays have the promised lengths; `points` and
+// `normals` point to 3 * `count` doubles, unless `normals` is null; `bits` and `sums` point to as
+// many elements as they get.
+BvsStatus bvs_tracer_visible_f64(const BvsTracerF64 *tracer, const BvsSky *sky, const double *points, const double *normals, size_t count, uint64_t *bits, double *sums);
 
 #ifdef __cplusplus
 }  // extern "C"

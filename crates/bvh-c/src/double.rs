@@ -13,7 +13,7 @@ use std::sync::{Arc, OnceLock};
 /// Triangles in f64 in the wide layout. Any number of threads may trace rays at the same time. A
 /// thread that frees a tracer must be the only user.
 pub struct BvsTracerF64 {
-    wide: DWideBvh,
+    pub(crate) wide: DWideBvh,
     source: Arc<OwnedTree>,
     /// Made when it is first needed.
     solid: OnceLock<Solid>,

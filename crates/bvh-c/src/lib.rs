@@ -14,6 +14,7 @@ macro_rules! same_layout {
 mod double;
 mod failure;
 mod instances;
+mod sky;
 #[cfg(test)]
 mod tests;
 mod tracer;

@@ -2,8 +2,9 @@
 //! crates.
 
 use crate::failure::{BvsStatus, bvs_last_error, status};
-use crate::{double::*, instances::*, tracer::*, tree::*};
+use crate::{double::*, instances::*, sky::*, tracer::*, tree::*};
 use bvh_search::bvh_core::export::Target;
+use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::bvh_core::{DRay, DTriangle, DWideBvh, Orientation, Primitives, Select};
 use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::ffi::{CStr, CString, c_void};
@@ -404,6 +405,179 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         let single = self::tree(&[0.0; 9]);
         rejected(bvs_tracer_f64_new(single).is_null(), "vertices_f64");
         bvs_tree_free(single);
+    }
+}
+
+#[test]
+fn points_see_the_directions_in_which_rays_hit_nothing_in_both_precisions() {
+    let corners = corners(40);
+    let doubles: Vec<f64> = corners.iter().map(|&x| x.into()).collect();
+    let objects = BvsObjects { vertices: null(), vertices_f64: doubles.as_ptr(), ..soup(&corners) };
+    let directions: Vec<[f64; 3]> = (0..70u8)
+        .map(|i| [f64::from(i % 7) - 3.0, f64::from(i % 5) - 2.0, f64::from(i) - 34.5])
+        .collect();
+    let weights: Vec<f64> = (0..140).map(f64::from).collect();
+    let points: Vec<[f32; 3]> =
+        (0..1000u16).map(|i| [f32::from(i % 40) + 0.3, 0.4, f32::from(i) * 0.04]).collect();
+    let double = |vectors: &[[f32; 3]]| -> Vec<[f64; 3]> {
+        vectors.iter().map(|vector| vector.map(f64::from)).collect()
+    };
+    let wide_points = double(&points);
+    let normals = vec![[0.0, 2.0, 1.0f32]; 1000];
+    let wide_normals = double(&normals);
+    let sky = BvsSky {
+        directions: directions.as_ptr().cast(),
+        count: 70,
+        t_min: 0.125,
+        t_max: 0.5,
+        weights: weights.as_ptr(),
+        columns: 2,
+        cosine: 1,
+    };
+    let mut free = [vec![9; 2000], vec![9; 2000]];
+    let mut sums = [vec![9.0; 2000], vec![9.0; 2000]];
+    // SAFETY: every array has the promised length, and everything is freed once.
+    unsafe {
+        let tree = tree(&corners);
+        let of_doubles = bvs_tree_bake(&BvsBake { objects, work: 3000, ..NO_BAKE });
+        let (single, wide) = (bvs_tracer_new(tree), bvs_tracer_f64_new(of_doubles));
+        bvs_tree_free(tree);
+        bvs_tree_free(of_doubles);
+        let [first, second] = &mut free;
+        let [single_sums, wide_sums] = &mut sums;
+        let mut see = |sky: &BvsSky, has_normals: bool| {
+            let at = |vectors: &[[f32; 3]]| vectors.as_ptr().cast();
+            let wide_at = |vectors: &[[f64; 3]]| vectors.as_ptr().cast();
+            let (near, far) = match has_normals {
+                true => (at(&normals), wide_at(&wide_normals)),
+                false => (null(), null()),
+            };
+            let to = (first.as_mut_ptr(), single_sums.as_mut_ptr());
+            ok(bvs_tracer_visible(single, sky, at(&points), near, 1000, to.0, to.1));
+            let to = (second.as_mut_ptr(), wide_sums.as_mut_ptr());
+            ok(bvs_tracer_visible_f64(wide, sky, wide_at(&wide_points), far, 1000, to.0, to.1));
+            let mut counts = [0; 2];
+            for (point, origin) in points.iter().enumerate() {
+                let mut expected = [[0.0; 2]; 2];
+                for (number, direction) in directions.iter().enumerate() {
+                    let mut hits = [9; 2];
+                    let ray = BvsRay {
+                        origin: *origin,
+                        t_min: sky.t_min as f32,
+                        direction: direction.map(|x| x as f32),
+                        t_max: sky.t_max as f32,
+                    };
+                    let wide_ray = BvsRayF64 {
+                        origin: wide_points[point],
+                        t_min: sky.t_min,
+                        direction: *direction,
+                        t_max: sky.t_max,
+                    };
+                    ok(bvs_any(single, &ray, &mut hits[0]));
+                    ok(bvs_any_f64(wide, &wide_ray, null(), &mut hits[1]));
+                    let cosine = DVec3::new(0.0, 2.0, 1.0)
+                        .normalize()
+                        .dot(DVec3::from(*direction).normalize());
+                    let is_above = cosine > 0.0 || !has_normals;
+                    for (precision, free) in [&first, &second].into_iter().enumerate() {
+                        let bit = free[2 * point + number / 64] >> (number % 64) & 1;
+                        assert_eq!(bit, u64::from(is_above && hits[precision] == 0));
+                        counts[bit as usize] += 1;
+                        for column in 0..sky.columns {
+                            let weight = if sky.weights.is_null() {
+                                1.0
+                            } else {
+                                weights[2 * number + column]
+                            };
+                            let factor = if sky.cosine != 0 { cosine } else { 1.0 };
+                            expected[precision][column] += weight * factor * bit as f64;
+                        }
+                    }
+                }
+                let columns = sky.columns;
+                for (sums, expected) in [&single_sums, &wide_sums].into_iter().zip(expected) {
+                    for column in 0..columns {
+                        let sum = sums[columns * point + column];
+                        assert!((sum - expected[column]).abs() < 1e-9, "{sum} {expected:?}");
+                    }
+                }
+            }
+            assert!(counts[0] > 1000 && counts[1] > 1000, "{counts:?}");
+        };
+        see(&sky, true);
+        see(&BvsSky { cosine: 0, ..sky }, true);
+        see(&BvsSky { cosine: 0, weights: null(), columns: 1, t_min: 0.0, ..sky }, false);
+        // Either result alone.
+        let (kept, at) = (free.clone(), points.as_ptr().cast());
+        let plain = BvsSky { cosine: 0, weights: null(), t_min: 0.0, ..sky };
+        free[0].fill(9);
+        let to = free[0].as_mut_ptr();
+        ok(bvs_tracer_visible(single, &plain, at, null(), 1000, to, null_mut()));
+        assert!(free == kept);
+        let old = std::mem::replace(&mut sums[0], vec![9.0; 2000]);
+        let to = sums[0].as_mut_ptr();
+        ok(bvs_tracer_visible(single, &plain, at, null(), 1000, null_mut(), to));
+        assert!(sums[0][..1000] == old[..1000]);
+        ok(bvs_tracer_visible(
+            single,
+            &BvsSky { count: 0, ..plain },
+            at,
+            null(),
+            1000,
+            null_mut(),
+            to,
+        ));
+        assert!(sums[0][..1000] == [0.0; 1000]);
+        sums[0].fill(9.0);
+        let to = sums[0].as_mut_ptr();
+        let failed = |sky, points: &[[f32; 3]], normals, message| {
+            let points = points.as_ptr().cast();
+            invalid(bvs_tracer_visible(single, sky, points, normals, 2, null_mut(), to), message);
+        };
+        let nan = [[0.0; 3], [0.0, f32::NAN, 0.0]];
+        failed(&raw const sky, &nan, null(), "cosine is not 0 and normals is null");
+        failed(
+            &plain,
+            &nan,
+            null(),
+            "points[1] is [0, NaN, 0]; accepted: up to 3.4028234663852886e38",
+        );
+        failed(&plain, &points, nan.as_ptr().cast(), "normals[1] is [0, NaN, 0]");
+        failed(null(), &points, null(), "sky is null");
+        failed(&BvsSky { t_min: -1.0, ..plain }, &points, null(), "the range -1..=0.5");
+        failed(&BvsSky { directions: null(), ..plain }, &points, null(), "directions is null");
+        let none = [[0.0, 0.0, 1.0], [0.0; 3]];
+        let directions = none.as_ptr().cast();
+        failed(
+            &BvsSky { directions, count: 2, ..plain },
+            &points,
+            null(),
+            "direction 1 is [0, 0, 0]",
+        );
+        let weights = [1.0, f64::INFINITY];
+        let weights = weights.as_ptr();
+        failed(
+            &BvsSky { weights, columns: 1, count: 2, ..plain },
+            &points,
+            null(),
+            "weight 1 is inf",
+        );
+        failed(
+            &BvsSky { weights, columns: 0, ..plain },
+            &points,
+            null(),
+            "0 weights for 70 directions",
+        );
+        let far = [[0.0, 0.0, 1e37]];
+        let wide_far = far.as_ptr().cast();
+        let status = bvs_tracer_visible_f64(wide, &plain, wide_far, null(), 1, null_mut(), to);
+        invalid(
+            status,
+            "points[0] is [0, 0, 10000000000000000000000000000000000000]; accepted: up to 1.3",
+        );
+        assert!(sums[0] == [9.0; 2000]);
+        bvs_tracer_free(single);
+        bvs_tracer_f64_free(wide);
     }
 }
 

@@ -12,6 +12,7 @@ use bvh_scenes::trace::{Accelerator, KdTree, Structure};
 use bvh_scenes::{Precision, Scene, tree_file};
 use glam::DVec3;
 use std::borrow::Cow;
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -28,9 +29,10 @@ pub struct RenderArgs {
     /// time.
     #[arg(long, value_name = "NAME|FILE.bvh", default_value = "bvh")]
     pub accel: String,
-    /// Show the number of tests of each pixel's rays instead of the scene.
-    #[arg(long)]
-    pub heatmap: bool,
+    /// Show the number of tests of each pixel's rays instead of the scene. The last colour is for
+    /// so many tests per ray, or for most pixels of this picture.
+    #[arg(long, value_name = "TESTS", num_args = 0..=1, require_equals = true)]
+    pub heatmap: Option<Option<NonZeroU32>>,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size)]
     pub size: (u32, u32),
@@ -96,7 +98,7 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
     output_file("--out", &args.out, "png")?;
     let precision = if is_file { precision_of(accel)? } else { Precision::Single };
     let scene = load_scene(&args.scene, precision)?;
-    if args.heatmap && args.accel == "wide" {
+    if args.heatmap.is_some() && args.accel == "wide" {
         return Err(Error::Usage(
             "--heatmap: the wide layout counts no tests; \
              accepted with it: --accel brute, kdtree, bvh, FILE.bvh"
@@ -112,8 +114,10 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
     let film = draw(&scene, &accelerator, &options, &|| bar.inc(1));
     bar.finish_and_clear();
     let rendered = start.elapsed().as_secs_f64() - built;
-    let heat::Range { median, top } = heat::range(film.tests.clone());
-    let heat = args.heatmap.then(|| heat::colours(&film, top));
+    let heat::Range { median, top: common } = heat::range(film.tests.clone());
+    let rays_per_pixel = f64::from(options.samples * options.samples);
+    let top = args.heatmap.flatten().map(|tests| f64::from(tests.get()) * rays_per_pixel);
+    let heat = args.heatmap.map(|_| heat::colours(&film, top.unwrap_or(common)));
     let bytes = png(film.width, heat.as_ref().unwrap_or(&film.pixels))
         .map_err(WriteError::of(&args.out, "encode the picture"))?;
     files::write(&args.out, &bytes)?;
@@ -129,11 +133,11 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
     answer.record("seconds_to_build", built);
     answer.record("seconds_to_render", rendered);
     if args.accel != "wide" {
-        let rays_per_pixel = f64::from(options.samples * options.samples);
         answer.fact("boxes per ray", film.counts.boxes as f64 / film.rays as f64);
         answer.fact("objects per ray", film.counts.objects as f64 / film.rays as f64);
         answer.fact("median tests per ray of a pixel", median / rays_per_pixel);
-        answer.fact("tests per ray of the last colour of --heatmap", top / rays_per_pixel);
+        let top = top.unwrap_or(common) / rays_per_pixel;
+        answer.fact("tests per ray of the last colour of --heatmap", top);
     }
     answer.say(&format!("picture: {}", args.out.display()));
     Ok(())

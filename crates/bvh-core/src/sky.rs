@@ -198,6 +198,11 @@ impl Sky {
         &self.directions
     }
 
+    /// The weights: a row of [`columns`](Self::columns) for each direction.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
     /// The number of weights of each direction.
     pub fn columns(&self) -> usize {
         self.columns

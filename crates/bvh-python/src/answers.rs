@@ -2,12 +2,14 @@
 
 use crate::precision::Real;
 use crate::rays::{RaySource, Selection};
+use crate::sky::Views;
 use crate::threads::Query;
-use bvh_search::bvh_core::Traced;
+use bvh_search::bvh_core::{Traced, neighbours};
 use bvh_search::prelude::*;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
+use std::mem;
 
 /// One number per ray, hit or point.
 pub type Column<'py, T> = Bound<'py, PyArray1<T>>;
@@ -178,6 +180,43 @@ impl<'py, N: Real> Call<'_, 'py, N> {
             Query::ask(py, progress, points.len().div_ceil(FEW), answer)?;
         let positions = positions.into_pyarray(py).reshape([points.len(), 3])?;
         Ok((positions, objects.into_pyarray(py), distances.into_pyarray(py)))
+    }
+
+    /// Returns a row of answers for each point; `answer` writes it by the point's number and the
+    /// bits of the directions that are free.
+    pub fn visible<T: numpy::Element + Clone + Default>(
+        self,
+        views: &Views<N>,
+        answer: impl Fn(usize, &[u64], &mut [T]) + Sync,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let Self { py, progress, layout } = self;
+        let view = views.view();
+        let (count, words) = (view.points.len(), views.sky.words());
+        let width = views.shape[1..].iter().product::<usize>();
+        let answers = Query::ask(py, progress, count.div_ceil(FEW), |query| {
+            let mut answers = Vec::new();
+            let fault =
+                |_| format!("points: {count} rows of {width} answers do not fit into memory");
+            answers.try_reserve_exact(count.saturating_mul(width)).map_err(fault)?;
+            answers.resize(count * width, T::default());
+            let order = neighbours(layout, view.points);
+            // Neighbours are answered together, each in its own row.
+            let mut rows: Vec<&mut [T]> = answers.chunks_mut(width.max(1)).collect();
+            rows.resize_with(count, Default::default);
+            let ordered = order.iter().map(|&point| mem::take(&mut rows[point as usize]));
+            let mut ordered: Vec<&mut [T]> = ordered.collect();
+            let parts = ordered.par_chunks_mut(FEW).zip(order.par_chunks(FEW));
+            query.answer(parts, |_, (answers, order)| {
+                let mut free = vec![0; order.len() * words];
+                views.sky.visible(layout, view, order, &mut free);
+                for (number, (&point, answers)) in order.iter().zip(answers).enumerate() {
+                    answer(point as usize, &free[number * words..][..words], answers);
+                }
+                Ok(())
+            })?;
+            Ok(answers)
+        })?;
+        Ok(answers.into_pyarray(py).reshape(&views.shape[..])?.into_any())
     }
 
     /// Answers with the weights and normals of the triangles with these indices, or −1.

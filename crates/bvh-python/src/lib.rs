@@ -10,6 +10,7 @@ mod rays;
 mod scalars;
 mod scene;
 mod search;
+mod sky;
 mod threads;
 mod tracer;
 mod tree;
@@ -19,7 +20,7 @@ mod tree;
 #[pyo3::pymodule(name = "_bvh_search")]
 mod module {
     #[pymodule_export]
-    use crate::{scene::corners, scene::rows, tracer::Tracer, tree::Tree};
+    use crate::{scene::corners, scene::rows, sky::sky, tracer::Tracer, tree::Tree};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's name")]

@@ -77,6 +77,8 @@ pub trait Real: Number + Pod + Default {
     type Hit: Clone + Send + Sync;
     /// The coordinates that triangles may have.
     const ACCEPTED: &str;
+    /// The directions that rays may have.
+    const DIRECTIONS: &str;
 
     fn is_accepted(self) -> bool;
 
@@ -91,6 +93,9 @@ pub trait Real: Number + Pod + Default {
 
     /// Makes a ray over a range of distances, or says what is wrong with it.
     fn ray(origin: DVec3, direction: DVec3, limits: [f64; 2]) -> Result<Self::Ray, String>;
+
+    /// Returns the range of distances that a ray has over these limits.
+    fn range(limits: [f64; 2]) -> [f64; 2];
 
     /// Returns the origin and the direction.
     fn ends(ray: &Self::Ray) -> [DVec3; 2];
@@ -137,6 +142,7 @@ impl Real for f32 {
     type Ray = Ray;
     type Hit = Hit;
     const ACCEPTED: &str = FLOAT32;
+    const DIRECTIONS: &str = "finite, its largest component between 2^-100 and 2^100";
 
     fn is_accepted(self) -> bool {
         self.is_finite()
@@ -170,12 +176,13 @@ impl Real for f32 {
                 Ok(if is_same { ray } else { within() })
             }
             Err(InvalidRay::Origin(_)) => Err(wrong("origin", origin, Self::ACCEPTED)),
-            Err(InvalidRay::Direction(_)) => {
-                let accepted = "finite, its largest component between 2^-100 and 2^100";
-                Err(wrong("direction", direction, accepted))
-            }
+            Err(InvalidRay::Direction(_)) => Err(wrong("direction", direction, Self::DIRECTIONS)),
             Err(error @ InvalidRay::Range { .. }) => Err(error.to_string()),
         }
+    }
+
+    fn range(limits: [f64; 2]) -> [f64; 2] {
+        inward(limits).map(f64::from)
     }
 
     fn ends(ray: &Ray) -> [DVec3; 2] {
@@ -225,6 +232,7 @@ impl Real for f64 {
     type Ray = DRay;
     type Hit = DHit;
     const ACCEPTED: &str = "0 or 2^-150 to 2^120 in size";
+    const DIRECTIONS: &str = "0 or 2^-150 to 2^120 in size, the largest from 2^-100 to 2^100";
 
     fn is_accepted(self) -> bool {
         self == 0.0 || (DRay::LEAST..=DRay::MOST).contains(&self.abs())
@@ -250,12 +258,13 @@ impl Real for f64 {
     fn ray(origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 2]) -> Result<DRay, String> {
         DRay::new(origin, direction, t_min, t_max).map_err(|error| match error {
             OutOfExactRange::Origin(_) => wrong("origin", origin, Self::ACCEPTED),
-            OutOfExactRange::Direction(_) => {
-                let accepted = format!("{}, the largest from 2^-100 to 2^100", Self::ACCEPTED);
-                wrong("direction", direction, &accepted)
-            }
+            OutOfExactRange::Direction(_) => wrong("direction", direction, Self::DIRECTIONS),
             error => error.to_string(),
         })
+    }
+
+    fn range(limits: [f64; 2]) -> [f64; 2] {
+        limits
     }
 
     fn ends(ray: &DRay) -> [DVec3; 2] {

@@ -14,6 +14,35 @@ pub fn points<N: Real>(argument: &Bound<PyAny>) -> PyResult<Vec<<N::Layout as Tr
     Ok((0..points.len()).map(|index| N::point(slice.at(index))).collect())
 }
 
+/// Reads vectors, `(m, 3)`, or a row for each of so many points, as they are in rays: `part` 0 is an
+/// origin and 1 a direction.
+pub fn vectors<N: Real, T>(
+    name: &str,
+    argument: &Bound<PyAny>,
+    (rows, part): (Option<usize>, usize),
+    made: impl Fn(DVec3) -> T,
+) -> PyResult<Vec<T>> {
+    let accepted = rows.map_or("(m, 3)".to_owned(), |rows| format!("({rows}, 3), as points"));
+    let vectors = Vectors::read(
+        name,
+        argument,
+        &accepted,
+        |shape| matches!(*shape, [found, 3] if rows.is_none_or(|rows| rows == found)),
+    )?;
+    let slice = vectors.slice()?;
+    let vector = |row| {
+        let found = slice.at(row);
+        let mut ends = [DVec3::ZERO, DVec3::X];
+        ends[part] = found;
+        let ray = N::ray(ends[0], ends[1], [0.0, 1.0]).map_err(|_| {
+            let accepted = [N::ACCEPTED, N::DIRECTIONS][part];
+            invalid(format!("{name} has {:?} in row {row}; accepted: {accepted}", found.to_array()))
+        })?;
+        Ok(made(N::ends(&ray)[part]))
+    };
+    (0..vectors.len()).map(vector).collect()
+}
+
 /// Points or directions in either precision, without a copy of the array.
 pub enum Vectors<'py> {
     Single(Array<'py, f32>),

@@ -31,6 +31,17 @@ pub fn work(argument: &Bound<PyAny>) -> PyResult<Option<u64>> {
     optional("work", argument, ALL_BITS)
 }
 
+/// Reads a number of directions.
+pub fn count(name: &str, argument: &Bound<PyAny>) -> PyResult<u32> {
+    const MOST: u32 = 1 << 24;
+    let accepted = format!("1 to {MOST}");
+    let count = number(name, argument, &accepted)?;
+    if !(1..=MOST).contains(&count) {
+        return Err(invalid(format!("{name} is {count}; accepted: {accepted}")));
+    }
+    Ok(count)
+}
+
 fn optional<'py, T: FromPyObjectOwned<'py, Error = PyErr>>(
     name: &str,
     argument: &Bound<'py, PyAny>,

@@ -6,6 +6,7 @@ use crate::arrays::numbers;
 use crate::elements::invalid;
 use crate::precision::Real;
 use crate::rays::{RayArrays, Selection, points};
+use crate::sky::Views;
 use crate::threads::detached;
 use crate::tree::Tree;
 use bvh_search::OwnedTree;
@@ -247,6 +248,48 @@ impl Tracer {
         let (rule, solid) = (rule(by)?, self.solid(points.py())?);
         call!(self, points.py(), progress, call, N => {
             call.signed_distances(solid, &self::points::<N>(points)?, rule)
+        })
+    }
+
+    /// Returns which of the `directions`, `(m, 3)`, are free from each of the `points`, `(n, 3)`: an
+    /// array `(n, m)` that is true where `any` finds no hit from `t_min` to `t_max`. With `weights`,
+    /// `(m,)` or `(m, k)`, returns instead their sums over each point's free directions, `(n,)` or
+    /// `(n, k)`, in `float64`: hours of sun, energies, view factors, in memory for these sums alone.
+    ///
+    /// With `normals`, `(n, 3)` and of any length, only directions d above the surface, n · d > 0,
+    /// count as free; `cosine=True` multiplies weights by the cosine of the angle between the two.
+    /// Surfaces stop directions at 0, so points on a surface need a `t_min`, or a place a
+    /// little above it.
+    ///
+    /// >>> below = [[0.5, 0.5, -1]]
+    /// >>> tracer.visible(below, [[0, 0, 1], [0, 1, 0]])
+    /// array([[False,  True]])
+    /// >>> tracer.visible(below, [[0, 0, 1], [0, 1, 0], [1, 0, 0]], [4, 2, 1])
+    /// array([3.])
+    #[pyo3(signature = (points, directions, weights = None, *, normals = None, cosine = false, t_min = None, t_max = None, progress = None))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
+    fn visible<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        weights: Option<&Bound<'py, PyAny>>,
+        normals: Option<&Bound<'py, PyAny>>,
+        cosine: bool,
+        t_min: Option<&Bound<'py, PyAny>>,
+        t_max: Option<&Bound<'py, PyAny>>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        call!(self, points.py(), progress, call, N => {
+            let optional = [weights, normals, t_min, t_max];
+            let views = Views::<N>::read([points, directions], optional, cosine)?;
+            match weights {
+                Some(_) => call.visible(&views, |point, row, to| views.sums(point, row, to)),
+                None => call.visible::<bool>(&views, |_, row, to| {
+                    for (number, to) in to.iter_mut().enumerate() {
+                        *to = row[number / 64] >> (number % 64) & 1 != 0;
+                    }
+                }),
+            }
         })
     }
 

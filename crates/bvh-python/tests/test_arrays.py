@@ -106,12 +106,24 @@ CALLS = {
         f"Tracer.{name} of a double tree": (getattr(Tracer(DOUBLE), name), RAYS | {"exclude": RANDOM.integers(-1, 20, (COUNT, 2))})
         for name in ("nearest", "any")
     },
+    **{
+        f"Tracer.visible of a {tree.precision} tree": (
+            Tracer(tree).visible,
+            {
+                "points": ORIGINS,
+                "directions": DIRECTIONS,
+                "weights": RANDOM.uniform(0, 9, (COUNT, 2)),
+                "normals": ORIGINS[::-1],
+            },
+        )
+        for tree in (TREE, DOUBLE)
+    },
     "RayMeshIntersector.contains_points": (of_trimesh("contains_points"), {"points": ORIGINS}),
 }
 
 # Parameters that are no arrays of numbers.
 OTHERS = {"self", "seconds", "references", "seed", "work", "progress", "path", "kind", "coherent", "invalid", "tracer"}
-OTHERS |= {"precision", "orientation", "by", "frame", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
+OTHERS |= {"cosine", "precision", "orientation", "by", "frame", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
 
 
 def unaligned(array):
@@ -167,9 +179,11 @@ def test_every_array_argument_has_a_layout_test():
     pytest.importorskip("trimesh")
     from bvh_search.trimesh import RayMeshIntersector
 
+    # One number each, for all directions.
+    limits = {"visible": {"t_min", "t_max"}}
     for kind in (Tree, Tracer, RaycastingScene, RayMeshIntersector):
         for name, call in inspect.getmembers(kind, callable):
             if name.startswith("_"):
                 continue
             tested = {argument for key, (_, arrays) in CALLS.items() if key.startswith(f"{kind.__name__}.{name}") for argument in arrays}
-            assert set(inspect.signature(call).parameters) - OTHERS <= tested, f"{kind.__name__}.{name}"
+            assert set(inspect.signature(call).parameters) - OTHERS - limits.get(name, set()) <= tested, f"{kind.__name__}.{name}"

@@ -459,7 +459,7 @@ def test_every_public_function_has_an_example_and_all_examples_run():
         names = [name for name in vars(part) if not name.startswith("_") and name.islower()]
         documentation = {name: getattr(part, name).__doc__ for name in names}
         assert {name for name, text in documentation.items() if ">>>" not in text} == set()
-        texts = [module.__doc__, part.__doc__, *documentation.values()]
+        texts = [module.__doc__, part.__doc__, bvh_search.sky.__doc__, *documentation.values()]
         examples = "\n\n".join(map(inspect.cleandoc, texts))
         test = doctest.DocTestParser().get_doctest(examples, {}, part.__name__, None, None)
         assert doctest.DocTestRunner().run(test).failed == 0

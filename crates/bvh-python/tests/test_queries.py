@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from bvh_search import RaycastingScene, Tracer, Tree
+from bvh_search import RaycastingScene, Tracer, Tree, sky
 
 RANDOM = np.random.default_rng(3)
 # An open mesh, near whose surface winding numbers are slow.
@@ -42,6 +42,7 @@ QUERIES = {
         f"Tracer.{name}": (getattr(TRACER, name), lambda count: rays(count)[:1])
         for name in ("contains", "closest", "signed_distance")
     },
+    "Tracer.visible": (TRACER.visible, lambda count: rays(count)[:1] + (sky()[0],)),
     **{
         f"RaycastingScene.{name}": (getattr(SCENE, name), lambda count: [np.concatenate(rays(count), axis=1)])
         for name in ("cast_rays", "test_occlusions", "count_intersections", "list_intersections")

@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let macros = macros.map(|(name, number)| format!("\n#define BVS_VERSION_{name} {number}"));
     config.after_includes = Some(macros.collect());
     let mut builder = cbindgen::Builder::new().with_config(config);
-    for source in ["failure", "tree", "tracer", "double", "instances"] {
+    for source in ["failure", "tree", "tracer", "double", "instances", "sky"] {
         builder = builder.with_src(library.join(format!("src/{source}.rs")));
     }
     builder.generate()?.write(std::io::stdout());

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ._numbers import Numbers, Progress
 
-__all__ = ["Tracer", "Tree", "__version__", "corners", "rows"]
+__all__ = ["Tracer", "Tree", "__version__", "corners", "rows", "sky"]
 
 __version__: str
 
@@ -342,6 +342,34 @@ class Tracer:
         >>> tracer.signed_distance([[0.5, 0.25, 2]])
         array([2.])
         """
+    def visible(
+        self,
+        points: Numbers,
+        directions: Numbers,
+        weights: Numbers | None = None,
+        *,
+        normals: Numbers | None = None,
+        cosine: bool = False,
+        t_min: Numbers | None = None,
+        t_max: Numbers | None = None,
+        progress: Progress | None = None,
+    ) -> NDArray[Any]:
+        """Returns which of the `directions`, `(m, 3)`, are free from each of the `points`, `(n, 3)`: an
+        array `(n, m)` that is true where `any` finds no hit from `t_min` to `t_max`. With `weights`,
+        `(m,)` or `(m, k)`, returns instead their sums over each point's free directions, `(n,)` or
+        `(n, k)`, in `float64`: hours of sun, energies, view factors, in memory for these sums alone.
+
+        With `normals`, `(n, 3)` and of any length, only directions d above the surface, n · d > 0,
+        count as free; `cosine=True` multiplies weights by the cosine of the angle between the two.
+        Surfaces stop directions at 0, so points on a surface need a `t_min`, or a place a
+        little above it.
+
+        >>> below = [[0.5, 0.5, -1]]
+        >>> tracer.visible(below, [[0, 0, 1], [0, 1, 0]])
+        array([[False,  True]])
+        >>> tracer.visible(below, [[0, 0, 1], [0, 1, 0], [1, 0, 0]], [4, 2, 1])
+        array([3.])
+        """
     def surface(
         self, origins: Numbers, directions: Numbers, triangle: Numbers
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[_Real]]:
@@ -357,6 +385,20 @@ class Tracer:
 def corners(vertex_positions: Numbers, triangle_indices: Numbers) -> NDArray[_Real]:
     """Returns the corners, `(n, 3, 3)`, of the triangles of a mesh, with the checks of
     `Tree.from_mesh`: in `float32` if the vertices are, and otherwise in `float64`.
+    """
+def sky(patches: int | None = None, *, uniform: int | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns directions of the sky above the plane of x (east) and y (north), unit vectors `(m, 3)`,
+    and their weights, `(m,)`: the solid angle of each over π. With `cosine=True`,
+    `Tracer.visible` then returns sky view factors, 1 for a free horizontal surface.
+
+    `patches` are the middles of the 145 patches of Tregenza, the default, or of the 577, 1297 and so
+    on, 144 k² + 1, into which Reinhart divides them, in rows from the horizon to the zenith, from
+    north over east. `uniform` directions have the same solid angle each.
+
+    >>> from bvh_search import sky
+    >>> directions, weights = sky(patches=145)
+    >>> directions[0].round(3), float(weights.sum().round(9))
+    (array([0.   , 0.995, 0.105]), 2.0)
     """
 def rows(name: str, argument: Numbers, length: int) -> NDArray[Any]:
     """Converts the argument called `name` to `float32` or `float64` and checks that its last axis has
