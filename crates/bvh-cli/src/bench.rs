@@ -77,7 +77,7 @@ pub fn bench(args: &BenchArgs, answer: &mut Answer) -> Result<(), Error> {
 }
 
 /// A tree and its triangles in the wide layout.
-enum Layout {
+pub enum Layout {
     Single(WideBvh),
     Double(DWideBvh),
 }
@@ -98,7 +98,7 @@ impl Layout {
     }
 
     /// Lays out the tree in a file.
-    fn of_file(path: &Path, scene: &Scene) -> Result<Self, Error> {
+    pub fn of_file(path: &Path, scene: &Scene) -> Result<Self, Error> {
         let bytes = tree_file::read(path)?;
         let objects = Some(&scene.primitives);
         let read = || {

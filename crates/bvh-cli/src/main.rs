@@ -16,6 +16,8 @@ mod rays;
 mod render;
 mod report;
 mod scenes;
+mod sky;
+mod table;
 
 use answer::Answer;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -64,6 +66,7 @@ enum Command {
     Orient(orient::OrientArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
+    Sky(Box<sky::SkyArgs>),
     /// List the built-in scenes and their sizes.
     Scenes,
     /// Print the file with which a shell completes arguments.
@@ -112,6 +115,7 @@ fn run(Cli { command, json, jobs }: Cli) -> Result<(), Error> {
         Command::Orient(args) => orient::orient(&args, &mut answer)?,
         Command::Render(args) => render::render(&args, &mut answer)?,
         Command::Report(args) => report::report(&args, &mut answer)?,
+        Command::Sky(args) => sky::sky(&args, &mut answer)?,
         Command::Scenes => scenes::scenes(&mut answer)?,
         Command::Completions { shell } => {
             let mut file = Vec::new();

@@ -1,12 +1,14 @@
-//! Recorded rays as an array that `numpy.save` wrote.
+//! Recorded rays and points as an array that `numpy.save` wrote.
 
-/// Returns the numbers of an array of shape (n, 6) or (n, 2, 3), `float32` or `float64` in either
-/// order of bytes, row by row, in whatever order the file has them. Doubles are rounded. The format is described in `numpy.lib.format`.
+/// Returns the numbers of an array, `float32` or `float64` in either order of bytes, row by row, in
+/// whatever order the file has them, and how many are in a row: of shape (n, `width`) for one of the
+/// `widths`, and also (n, 2, 3) where six are accepted. Doubles are rounded. The format is described
+/// in `numpy.lib.format`.
 ///
 /// # Errors
 ///
 /// Returns a message for bytes that are no such array, or less or more of it than its shape says.
-pub fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
+pub fn read_npy(bytes: &[u8], widths: &[usize]) -> Result<(usize, Vec<f32>), String> {
     let (header, data) = split(bytes).ok_or("the file is not an array of numpy")?;
     let rejected = |accepted: &str| Err(format!("the array is {header}; accepted: {accepted}"));
     let kind = header.split_once("'descr':'").and_then(|(_, rest)| rest.split_once('\''));
@@ -17,14 +19,16 @@ pub fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
         Some(">f8") => (true, size_of::<f64>()),
         _ => return rejected("float32 or float64"),
     };
-    // The column of each of a segment's six numbers, of the array of columns.
-    let (segments, columns) = match shape(&header).as_deref() {
-        Some(&[segments, 6]) => (segments, [0, 1, 2, 3, 4, 5]),
-        Some(&[segments, 2, 3]) => (segments, [0, 2, 4, 1, 3, 5]),
+    // The column of each of a row's numbers, of the array of columns.
+    let (rows, columns) = match shape(&header).as_deref() {
+        Some(&[rows, width]) if widths.contains(&width) => (rows, (0..width).collect()),
+        Some(&[rows, 2, 3]) if widths.contains(&6) => (rows, vec![0, 2, 4, 1, 3, 5]),
+        _ if widths.contains(&3) => return rejected("(n, 3), (n, 6) or (n, 2, 3)"),
         _ => return rejected("(n, 6) or (n, 2, 3)"),
     };
+    let width = columns.len();
     // A copy that was cut off would otherwise train the tree for a part of its rays.
-    if segments.checked_mul(6 * size) != Some(data.len()) {
+    if rows.checked_mul(width * size) != Some(data.len()) {
         return Err(format!("the array is {header} and has {} bytes of data", data.len()));
     }
     let single = |&bytes: &[u8; 4]| match is_big {
@@ -40,10 +44,10 @@ pub fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
         _ => data.as_chunks().0.iter().map(double).collect(),
     };
     if !header.contains("'fortran_order':True") {
-        return Ok(numbers);
+        return Ok((width, numbers));
     }
-    let row = |segment| columns.map(|column| numbers[column * segments + segment]);
-    Ok((0..segments).flat_map(row).collect())
+    let row = |row| columns.iter().map(move |column| column * rows + row);
+    Ok((width, (0..rows).flat_map(row).map(|place| numbers[place]).collect()))
 }
 
 /// Splits an array into its header, without spaces, and its data.
@@ -88,12 +92,15 @@ mod tests {
         let numbers = [1.0, 2.0, 3.0, 4.0, 5.0, -6.5f32];
         let single = numbers.map(f32::to_le_bytes).concat();
         let double = numbers.map(|x| f64::from(x).to_le_bytes()).concat();
-        assert_eq!(read_npy(&array("<f4", "(1, 6)", &single)).unwrap(), numbers);
-        assert_eq!(read_npy(&array("<f8", "(1, 2, 3)", &double)).unwrap(), numbers);
+        let read = |array: &[u8], widths| read_npy(array, widths).unwrap();
+        let six = (6, numbers.to_vec());
+        assert_eq!(read(&array("<f4", "(1, 6)", &single), &[6]), six);
+        assert_eq!(read(&array("<f8", "(1, 2, 3)", &double), &[6]), six);
+        assert_eq!(read(&array("<f4", "(2, 3)", &single), &[3, 6]), (3, numbers.to_vec()));
         let single = numbers.map(f32::to_be_bytes).concat();
         let double = numbers.map(|x| f64::from(x).to_be_bytes()).concat();
-        assert_eq!(read_npy(&array(">f4", "(1, 6)", &single)).unwrap(), numbers);
-        assert_eq!(read_npy(&array(">f8", "(1, 2, 3)", &double)).unwrap(), numbers);
+        assert_eq!(read(&array(">f4", "(1, 6)", &single), &[6]), six);
+        assert_eq!(read(&array(">f8", "(1, 2, 3)", &double), &[6]), six);
     }
 
     #[test]
@@ -103,8 +110,9 @@ mod tests {
         let bytes = |order: [u8; 12]| order.map(|x| f32::from(x).to_le_bytes()).concat();
         let pairs = bytes([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11]);
         let triples = bytes([0, 6, 3, 9, 1, 7, 4, 10, 2, 8, 5, 11]);
-        assert_eq!(read_npy(&in_order("True", "<f4", "(2, 6)", &pairs)).unwrap(), rows);
-        assert_eq!(read_npy(&in_order("True", "<f4", "(2, 2, 3)", &triples)).unwrap(), rows);
+        let read = |array: &[u8]| read_npy(array, &[6]).unwrap().1;
+        assert_eq!(read(&in_order("True", "<f4", "(2, 6)", &pairs)), rows);
+        assert_eq!(read(&in_order("True", "<f4", "(2, 2, 3)", &triples)), rows);
     }
 
     #[test]
@@ -118,7 +126,7 @@ mod tests {
             (array("<f4", "(1, 1, 6)", &[0; 24]), "accepted: (n, 6) or (n, 2, 3)"),
             (array("<f4", "(6,)", &[0; 24]), "accepted: (n, 6) or (n, 2, 3)"),
         ] {
-            let found = read_npy(&bytes).unwrap_err();
+            let found = read_npy(&bytes, &[6]).unwrap_err();
             assert!(found.contains(message), "{found}");
         }
     }

@@ -4,6 +4,7 @@ use crate::Error;
 use crate::arguments::input_file;
 use crate::interrupt::is_interrupted;
 use crate::npy::read_npy;
+use crate::table::Table;
 use bvh_config::fault;
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, DensityError, Ray, RayDensity, Segment, Slabs};
@@ -114,8 +115,8 @@ impl Rays {
 /// segments from 0, as arrays do.
 fn recorded(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
     let numbers = match format {
-        "csv" => read_csv(bytes)?,
-        "npy" => read_npy(bytes)?,
+        "csv" => Table::read(bytes, |width| width == 6, "six numbers")?.numbers,
+        "npy" => read_npy(bytes, &[6])?.1,
         _ => read_floats(bytes)?,
     };
     let (segments, rest) = numbers.as_chunks::<6>();
@@ -146,31 +147,6 @@ fn read_floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
         return Err(format!("there are {} bytes; accepted: a multiple of 24", bytes.len()));
     }
     Ok(floats.iter().map(|&float| f32::from_le_bytes(float)).collect())
-}
-
-/// Reads lines of six numbers, separated by commas, semicolons or blanks. The first line may be a
-/// header, which has no number, and lines may be blank.
-fn read_csv(bytes: &[u8]) -> Result<Vec<f32>, String> {
-    let text = str::from_utf8(bytes).map_err(|_| "the file is not UTF-8".to_owned())?;
-    // Spreadsheets begin UTF-8 with this mark, which would make the first number a word.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut numbers = Vec::new();
-    for (line_number, line) in (1..).zip(text.lines()) {
-        let number = |field: &str| field.trim().parse().ok();
-        let fields: Vec<Option<f32>> = match line.find([',', ';']) {
-            Some(place) => line.split(char::from(line.as_bytes()[place])).map(number).collect(),
-            None => line.split_whitespace().map(number).collect(),
-        };
-        let is_header = line_number == 1 && fields.iter().all(Option::is_none);
-        if is_header || line.trim().is_empty() {
-            continue;
-        }
-        let &[Some(x), Some(y), Some(z), Some(to_x), Some(to_y), Some(to_z)] = &fields[..] else {
-            return Err(format!("line {line_number} is {line:?}; accepted: six numbers"));
-        };
-        numbers.extend([x, y, z, to_x, to_y, to_z]);
-    }
-    Ok(numbers)
 }
 
 #[cfg(test)]

@@ -33,13 +33,20 @@ pub struct RenderArgs {
     /// so many tests per ray, or for most pixels of this picture.
     #[arg(long, value_name = "TESTS", num_args = 0..=1, require_equals = true)]
     pub heatmap: Option<Option<NonZeroU32>>,
-    /// Width and height in pixels.
-    #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size)]
-    pub size: (u32, u32),
     /// Smooth edges with N² rays per pixel.
     #[arg(long, value_name = "N", default_value_t = 2)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=16))]
     pub samples: u32,
+    #[command(flatten)]
+    pub camera: CameraArgs,
+}
+
+/// The camera of a picture.
+#[derive(clap::Args, Clone, Debug)]
+pub struct CameraArgs {
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size)]
+    pub size: (u32, u32),
     /// The eye. The default shows the whole scene from outside.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub from: Option<DVec3>,
@@ -71,20 +78,20 @@ fn point(text: &str) -> Result<DVec3, String> {
     }
 }
 
-impl RenderArgs {
-    fn options(&self, scene: &Scene) -> Options {
+impl CameraArgs {
+    /// Returns the view of a scene that has this direction up.
+    pub fn view(&self, scene: &Scene, up: DVec3) -> View {
         let (width, height) = self.size;
-        let automatic = framing::automatic(scene, f64::from(width) / f64::from(height));
+        let automatic = framing::upright(scene, up, f64::from(width) / f64::from(height));
         // The automatic eye fits the automatic angle; any other pair gets the default angle.
-        let view = match (self.from, self.at) {
+        match (self.from, self.at) {
             (None, None) => automatic,
             (from, at) => View {
                 from: from.unwrap_or(automatic.from),
                 at: at.unwrap_or_else(|| Aabb::union_of(&scene.boxes).doubled_centroid() / 2.0),
                 fov: View::FOV,
             },
-        };
-        Options { samples: self.samples, ..Options::new(width, height, view) }
+        }
     }
 }
 
@@ -105,7 +112,9 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
                 .into(),
         ));
     }
-    let options = args.options(&scene);
+    let (width, height) = args.camera.size;
+    let view = args.camera.view(&scene, scene.up());
+    let options = Options { samples: args.samples, ..Options::new(width, height, view) };
     let start = Instant::now();
     let accelerator = Accelerator::new(&scene.primitives, structure(&args.accel, &scene)?);
     let built = start.elapsed().as_secs_f64();

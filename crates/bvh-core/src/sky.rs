@@ -174,7 +174,7 @@ impl Sky {
     /// Sets the range: `range[0] <= t <= range[1]` in multiples of the directions' lengths.
     pub fn with_range(self, range: [f64; 2]) -> Result<Self, InvalidSky> {
         let [begin, end] = range;
-        if !(begin >= 0.0 && !end.is_nan()) {
+        if begin.is_nan() || begin < 0.0 || end.is_nan() {
             return Err(InvalidSky::Range(begin, end));
         }
         Ok(Self { range: [begin, end.min(f64::MAX)], ..self })
@@ -265,13 +265,15 @@ impl Sky {
     /// direction's angle with it.
     pub fn sums(&self, row: &[u64], normal: Option<DVec3>) -> Vec<f64> {
         let mut sums = vec![0.0; self.columns];
-        let normal = normal.map(|normal| normal / normal.length());
+        // Of about the length 1, so that no square overflows.
+        let unit = |vector: DVec3| (vector / vector.abs().max_element()).normalize();
+        let normal = normal.map(unit);
         let weights = self.weights.chunks_exact(self.columns.max(1));
         for (number, (weights, direction)) in weights.zip(&self.directions).enumerate() {
             if row[number / 64] >> (number % 64) & 1 == 0 {
                 continue;
             }
-            let cosine = normal.map_or(1.0, |normal| normal.dot(*direction) / direction.length());
+            let cosine = normal.map_or(1.0, |normal| normal.dot(unit(*direction)));
             for (sum, weight) in sums.iter_mut().zip(weights) {
                 *sum += weight * cosine;
             }

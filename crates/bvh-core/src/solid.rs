@@ -276,6 +276,8 @@ impl Traced for DWideBvh {
         range: [f64; 2],
         free: &mut dyn FnMut(usize, u64),
     ) {
+        let directions: Vec<DVec3> = directions.iter().map(|&d| DRay::exact(d)).collect();
+        let directions = &directions[..];
         Beams { obstacles: self, points, normals, directions, range }.trace(free);
     }
 }

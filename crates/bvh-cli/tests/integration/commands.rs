@@ -47,6 +47,9 @@ fn folder() -> tempfile::TempDir {
     write("file", b"");
     write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("mesh.ply", b"ply\n");
+    write("down.csv", b"x,y,z,w\n0,0,1,1\n\n0,0,0,1\n");
+    write("heavy.csv", b"0,0,1,1\n0,0,1,inf\n");
+    write("yxz.csv", b"y,x,z\n0,0,1\n");
     write("wrong.toml", b"count = 9\nbouncy = 1\ncameras = []\n");
     write("blind.toml", b"cameras = [{ eye = [1.0, 2.0, 3.0] }]\n");
     write("none.toml", b"bounces = 1");
@@ -81,6 +84,10 @@ report good.bvh spheres7500 --out=no/x.html ! no is no folder
 report good.bvh spheres75 --out=good.bvh ! --out: good.bvh | .html
 report good.bvh escher --out=x.html ! good.bvh | scene
 export good.bvh spheres75 --for=obvhs --out=x.bvh ! --out | .bin
+sky mesh.obj --out=x.obj ! --out: x.obj | .csv, .ply, .glb or .png
+sky mesh.ply --out=mesh.ply ! --out: mesh.ply is read | another name
+sky mesh.obj --directions=away.csv --out=away.csv ! --out: away.csv is read
+sky mesh.obj --out=no/x.csv ! no is no folder
 orient mesh.obj --out=mesh.obj ! --out: mesh.obj is the scene | another name
 orient mesh.obj --out=x.glb ! --out | .obj
 orient no.glb --out=x.glb ! no.glb: no such file
@@ -133,6 +140,20 @@ render spheres75 --out=x.png --accel=octree ! octree | brute, kdtree, bvh, wide
 render spheres75 --out=x.png --accel=wide ! spheres75: spheres | --accel brute
 render escher --out=x.png --accel=wide --heatmap ! counts no tests
 render spheres75 --out=x.png --size=0x10 ! --size | 960x540
+sky spheres75 --out=x.csv ! spheres75: spheres
+sky mesh.obj --out=x.csv --directions=down.csv ! down.csv: line 4: direction 1 is [0, 0, 0]
+sky mesh.obj --out=x.csv --directions=heavy.csv ! heavy.csv: line 2: weight 1 is inf
+sky mesh.obj --out=x.csv --directions=yxz.csv ! yxz.csv: line 1 is | y,x,z | first are x,y,z
+sky mesh.obj --out=x.csv --points=yxz.csv ! yxz.csv: line 1 is | y,x,z
+sky mesh.obj --out=x.csv --points=away.csv --per=vertex ! --points | --per
+sky mesh.obj --out=x.csv --points=heavy.csv ! heavy.csv: line 1 is | 0,0,1,1 | x,y,z,nx,ny,nz
+sky mesh.obj --out=x.csv --points=mesh.obj ! mesh.obj: --points accepts | .npy or .ply
+sky mesh.obj --out=x.csv --points=mesh.ply ! mesh.ply
+sky mesh.obj --out=x.png --per=vertex ! a point in each pixel | .glb
+sky mesh.obj --out=x.csv --column=hours ! no column | hours | accepted: sky_view_factor
+sky mesh.obj --out=x.csv --sun=80,0 --dates=2026-12-21 ! --dates: the sun does not rise
+sky mesh.obj --out=x.csv --sun=47,8 ! --dates
+sky mesh.obj --out=x.csv --tree=good.bvh ! good.bvh | 75 objects
 render spheres75 --out=x.png --from=1,2 ! --from | three numbers
 ";
 
@@ -200,6 +221,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
             ("orient", &["mesh.obj", "--out=x.obj"]),
             ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
             ("report", &["good.bvh", "spheres75"]),
+            ("sky", &["mesh.obj", "--out=x.csv"]),
             ("scenes", &[]),
             ("completions", &["bash"]),
         ],
@@ -215,6 +237,7 @@ fn the_results_of_all_commands_are_printed_as_json() {
         ("bake escher --budget=1Mwork --parts=2 --list", "parts"),
         ("render spheres75 --size=8x8 --out=x.png", "rays"),
         ("report good.bvh spheres75", "depth"),
+        ("sky mesh.obj --out=x.ply", "mean"),
         ("verify good.bvh spheres75", "valid"),
     ] {
         let facts = facts(folder.path(), line);

@@ -11,4 +11,5 @@ mod export;
 mod inspect;
 mod orient;
 mod render;
+mod sky;
 mod support;

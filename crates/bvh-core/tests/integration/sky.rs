@@ -134,7 +134,9 @@ fn a_direction_is_free_in_f64_where_a_ray_along_it_hits_nothing_on_every_kernel(
                 triangles.iter().map(|t| DTriangle(t.0.map(moved))).collect();
             let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.0).collect();
             let points = points(&corners, 150, &mut random);
-            let directions = directions(&corners, &points, &mut random);
+            let mut directions = directions(&corners, &points, &mut random);
+            // The second component counts as 0.
+            directions.push(DVec3::new(2.0f64.powi(-99), 2.0f64.powi(-151), 2.0f64.powi(-101)));
             let frame = match random.below(2) {
                 0 => frame(points[0], &mut random),
                 _ => DWideBvh::centred(&triangles),
@@ -187,6 +189,7 @@ fn with_normals_directions_below_the_surface_are_not_free_and_cosines_weigh() {
     assert_eq!(free, [0b010, 0b001]);
     assert_eq!(sky.sums(&free[..1], None), [2.0, 20.0]);
     assert_eq!(sky.sums(&free[1..], Some(normals[0].as_dvec3())), [0.8, 8.0]);
+    assert_eq!(sky.sums(&free[1..], Some(DVec3::Z * 1e200)), [0.8, 8.0]);
     sky.visible(&wide, View { points: &points, normals: None }, &[0, 1], &mut free);
     assert_eq!(free, [0b111; 2]);
     assert_eq!(sky.sums(&free[..1], None), [7.0, 70.0]);

@@ -16,6 +16,7 @@ use buffers::Buffers;
 use document::{DECOMPRESS, Document, Primitive, document, is_covered};
 use glam::{DMat4, DVec3};
 use nodes::places;
+pub use orient::glb;
 pub(super) use orient::orient;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;

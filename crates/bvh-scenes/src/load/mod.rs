@@ -12,6 +12,7 @@ mod stl;
 mod text;
 
 use crate::files::{ReadError, read};
+pub use gltf::glb;
 use mesh::{Fault, FromFile, Mesh};
 pub use orient::{Find, Oriented, orient};
 use std::path::{Path, PathBuf};

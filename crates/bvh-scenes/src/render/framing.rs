@@ -8,8 +8,12 @@ use glam::DVec3;
 /// Returns a view of a scene from outside, from above and a little from the side, whose distance
 /// just fits the whole box.
 pub fn automatic(scene: &Scene, aspect: f64) -> View {
+    upright(scene, scene.up(), aspect)
+}
+
+/// Returns the view that [`automatic`] does, with this direction up.
+pub fn upright(scene: &Scene, up: DVec3, aspect: f64) -> View {
     let bounds = &Aabb::union_of(&scene.boxes);
-    let up = scene.up();
     let front = if up == DVec3::Y { DVec3::Z } else { -DVec3::Y };
     // Meshes are seen from higher above, because their floor would otherwise be edge on.
     let (side, height) = match scene.primitives {

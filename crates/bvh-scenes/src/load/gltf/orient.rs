@@ -230,17 +230,26 @@ impl File<'_> {
                 target["node"] = child.into();
             }
         }
-        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
-        self.json["buffers"][0]["byteLength"] = self.binary.len().into();
-        let mut json = self.json.to_string().into_bytes();
-        json.resize(json.len().next_multiple_of(4), b' ');
-        let size = 28 + json.len() + self.binary.len() + further.len();
-        if u32::try_from(size).is_err() {
-            return Err(Fault::of_file(format!("{size} bytes of GLB; expected less than 4 GB")));
-        }
-        let word = |number: usize| (number as u32).to_le_bytes();
-        let head = [*b"glTF", word(2), word(size), word(json.len()), *b"JSON"].concat();
-        let middle = [word(self.binary.len()), *b"BIN\0"].concat();
-        Ok([&head, &json, &middle, &self.binary, further].concat())
+        glb(self.json, self.binary, further)
     }
+}
+
+/// Returns the bytes of a GLB file of this document, whose first buffer is `binary`, and which ends
+/// with the `further` chunks.
+///
+/// # Errors
+/// 4 GB or more.
+pub fn glb(mut json: Value, mut binary: Vec<u8>, further: &[u8]) -> Result<Vec<u8>, Fault> {
+    binary.resize(binary.len().next_multiple_of(4), 0);
+    json["buffers"][0]["byteLength"] = binary.len().into();
+    let mut json = json.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let size = 28 + json.len() + binary.len() + further.len();
+    if u32::try_from(size).is_err() {
+        return Err(Fault::of_file(format!("{size} bytes of GLB; expected less than 4 GB")));
+    }
+    let word = |number: usize| (number as u32).to_le_bytes();
+    let head = [*b"glTF", word(2), word(size), word(json.len()), *b"JSON"].concat();
+    let middle = [word(binary.len()), *b"BIN\0"].concat();
+    Ok([&head, &json, &middle, &binary, further].concat())
 }
