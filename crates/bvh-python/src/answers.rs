@@ -189,7 +189,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         views: &Views<N>,
         answer: impl Fn(usize, &[u64], &mut [T]) + Sync,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let Self { py, progress, layout } = self;
+        let Self { py, progress, layout, .. } = self;
         let view = views.view();
         let (count, words) = (view.points.len(), views.sky.words());
         let width = views.shape[1..].iter().product::<usize>();
