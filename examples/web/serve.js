@@ -1,17 +1,17 @@
-// Serves this folder: npm start [-- PORT]. The page itself is static; any other server will do.
+// Serves this folder: npm start [-- PORT]. The page itself is static; any other server will do (`scripts/pack` collects its files).
 import { createReadStream } from 'node:fs';
 import { stat } from 'node:fs/promises';
 import { createServer } from 'node:http';
 import { extname, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
-const folder = fileURLToPath(new URL('.', import.meta.url));
+const here = fileURLToPath(new URL('.', import.meta.url));
 const types = {
     '.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript', '.wasm': 'application/wasm', '.json': 'application/json',
 };
 
-/** Listens at a port of this machine, any free one if it is 0; returns the server. */
-export async function serve(port) {
+/** Serves a folder at a port of this machine, any free one if it is 0; returns the server. */
+export async function serve(port, folder = here) {
     const server = createServer(async (request, response) => {
         // The path of a URL has no '..' left.
         const path = decodeURIComponent(new URL(request.url, 'http://localhost').pathname);

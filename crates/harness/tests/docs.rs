@@ -131,7 +131,10 @@ fn what_readers_begin_with_is_short_and_its_numbers_are_bound() {
         assert_eq!(unbound(&text), [""; 0], "{name}: numbers without an id of docs/numbers.toml");
     }
     let readme = fs::read_to_string(top().join("README.md")).unwrap();
-    let (lines, words) = (readme.lines().count(), readme.split_whitespace().count());
+    let lines = readme.lines().count();
+    // Nobody reads the comments.
+    let words = Regex::new("(?s)<!--.*?-->").unwrap().replace_all(&readme, "");
+    let words = words.split_whitespace().count();
     assert!(lines <= 100 && words <= 900, "{lines} lines, {words} words; accepted: 100, 900");
     let text = "8 to 25<!-- =a b --> %, 3 s, `4 %`, 1.5×, 6 %<!-- =c -->, 7 scenes";
     assert_eq!(unbound(text), ["3 s", "1.5 ×"]);

@@ -16,7 +16,8 @@ let server;
 
 before(async () => {
     if (skip) return;
-    server = await serve(0);
+    // PAGE names a folder of `scripts/pack`.
+    server = await serve(0, process.env.PAGE);
     const args = ['--no-sandbox', '--disable-gpu', '--disable-background-networking', '--disable-quic'];
     browser = await chromium.launch({ executablePath, args });
 });

@@ -710,8 +710,7 @@ impl<K: Instructions> Intervals<K> {
         unsafe {
             let planes = node.planes.as_ptr();
             let origins = self.origins.get_unchecked(vector);
-            for axis in 0..3 {
-                let [near_origin, far_origin] = origins[axis];
+            for (axis, &[near_origin, far_origin]) in origins.iter().enumerate() {
                 let [near_factor, far_factor] = self.factors[axis];
                 let near = K::Boxes::load(planes.add(self.near[axis]).cast());
                 let far = K::Boxes::load(planes.add(self.far[axis]).cast());
