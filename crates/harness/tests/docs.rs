@@ -126,7 +126,7 @@ fn unbound(text: &str) -> Vec<String> {
 
 #[test]
 fn what_readers_begin_with_is_short_and_its_numbers_are_bound() {
-    for name in ["README.md", "docs/use/CHOOSING.md"] {
+    for name in ["README.md", "docs/use/CHOOSING.md", "docs/use/COOKBOOK.md"] {
         let text = fs::read_to_string(top().join(name)).unwrap();
         assert_eq!(unbound(&text), [""; 0], "{name}: numbers without an id of docs/numbers.toml");
     }
