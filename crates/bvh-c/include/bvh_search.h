@@ -352,7 +352,7 @@ void bvs_bytes_free(uint8_t *bytes, size_t size);
 BvsStatus bvs_tree_save(const BvsTree *tree, const char *path);
 
 // Writes the tree to the file `path`, in UTF-8, for the tracer of another library, by its name for
-// `bvh export` (docs/INTEROP.md). The file is the same as of that command. A query for all hits of
+// `bvh export` (docs/use/INTEROP.md). The file is the same as of that command. A query for all hits of
 // three-mesh-bvh, of the crate bvh and of a reader of json finds a divided triangle more than once:
 // for these, `divided` is 1 if your queries are for the nearest or any hit. 0 rejects such a tree.
 //

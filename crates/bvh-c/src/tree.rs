@@ -441,7 +441,7 @@ pub unsafe extern "C" fn bvs_tree_save(tree: *const BvsTree, path: *const c_char
 }
 
 /// Writes the tree to the file `path`, in UTF-8, for the tracer of another library, by its name for
-/// `bvh export` (docs/INTEROP.md). The file is the same as of that command. A query for all hits of
+/// `bvh export` (docs/use/INTEROP.md). The file is the same as of that command. A query for all hits of
 /// three-mesh-bvh, of the crate bvh and of a reader of json finds a divided triangle more than once:
 /// for these, `divided` is 1 if your queries are for the nearest or any hit. 0 rejects such a tree.
 ///

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Write a tree for the tracer of another library: with the leaves that cost least there, no deeper
 /// than it accepts, and in its order; or a greedy tree, where its rays take fewer tests.
-/// docs/INTEROP.md has the lines that load the file.
+/// docs/use/INTEROP.md has the lines that load the file.
 #[derive(Args, Clone, Debug)]
 pub struct ExportArgs {
     /// The tree file.

@@ -79,7 +79,7 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes the nodes as CSV, whose columns docs/TREE_FILES.md describes.
+/// Writes the nodes as CSV, whose columns docs/use/TREE_FILES.md describes.
 fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
     // The flat tree stores no parents, so one pass over all children finds them.
     let mut parents = vec![None; tree.nodes.len()];

@@ -5,6 +5,15 @@ use glam::{DVec3, Vec3};
 
 /// An axis-aligned bounding box in world units. Its extents may be zero. [`Aabb::EMPTY`] is the box
 /// around nothing.
+///
+/// ```
+/// # use bvh_core::Aabb;
+/// let all = Aabb::from([[0.0; 3], [1.0; 3]]).union(&Aabb::from([[2.0; 3], [3.0; 3]]));
+/// assert_eq!(all, Aabb::from([[0.0; 3], [3.0; 3]]));
+/// // Half of the surface, as everywhere.
+/// assert_eq!(all.half_area(), 27.0);
+/// assert!(all.contains(&Aabb::EMPTY));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Aabb {

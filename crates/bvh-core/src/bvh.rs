@@ -101,6 +101,16 @@ impl Node {
 /// ranges of `prim_ids`, a permutation of the objects. A tree over no objects has no nodes.
 /// [`validate`](crate::validate()) checks all of this. A function on a tree that it rejects may panic,
 /// not return or take all memory, unless the function says that it checks the tree.
+///
+/// ```
+/// # use bvh_core::{Aabb, Bvh, Node, validate};
+/// let boxes = [Aabb::from([[0.0; 3], [1.0; 3]]), Aabb::from([[2.0; 3], [3.0; 3]])];
+/// let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);
+/// let leaves = [Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)];
+/// let tree = Bvh::new(vec![root, leaves[0], leaves[1]], vec![1, 0]);
+/// assert!(validate(&tree, &[boxes[1], boxes[0]]).is_ok());
+/// assert!(validate(&tree, &boxes).is_err(), "objects in the wrong leaves");
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bvh {
     /// The nodes; one entry per node, the root first.

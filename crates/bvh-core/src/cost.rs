@@ -12,6 +12,15 @@ pub use crate::layout_cost::{
 };
 
 /// The cost that a search minimises and that results report in the column `cost`.
+///
+/// ```
+/// # use bvh_core::{Aabb, Bvh, Node, cost::Objective};
+/// # let boxes = [Aabb::from([[0.0; 3], [1.0; 3]]), Aabb::from([[2.0; 3], [3.0; 3]])];
+/// # let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);
+/// # let tree = Bvh::new(vec![root, Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)], vec![0, 1]);
+/// // A root of 3 × 3 × 3 over two leaves: half of its surface.
+/// assert_eq!(Objective::InternalArea.cost(&tree), 27.0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(
     feature = "serde",

@@ -8,6 +8,15 @@ use glam::{Vec3, Vec4};
 /// Every value of this type is finite and has a direction, unless [`Ray::assume_valid`] made it.
 /// [`Ray::new`] rejects anything else, so no later test meets a NaN. A range with `t_min > t_max` is empty and hits nothing; a range with
 /// `t_min == t_max` is one point. Zero components of the direction may have either sign.
+///
+/// ```
+/// # use bvh_core::Ray;
+/// // Distances are in multiples of the direction: 1 is the light.
+/// let to_light = Ray::new([0.0, 0.0, 0.0], [0.0, 0.0, 9.0], 0.0, 1.0);
+/// assert!(to_light.is_ok());
+/// assert!(Ray::half_line([0.0, 0.0, f32::NAN], [0.0, 0.0, 1.0]).is_err());
+/// assert!(Ray::half_line([0.0; 3], [0.0; 3]).is_err(), "no direction");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(16))]
 pub struct Ray {

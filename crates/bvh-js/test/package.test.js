@@ -585,17 +585,27 @@ test('a mesh that would look different if it were turned is refused as it is', a
     }
 });
 
-test('the example of the README runs', async () => {
-    const readme = readFileSync(new URL('../README.md', import.meta.url), 'utf8');
-    const example = new URL('./readme-example.mjs', import.meta.url);
-    writeFileSync(example, readme.split('```js\n')[1].split('```')[0].replace('seconds: 5', 'seconds: 0.1'));
-    globalThis.mesh = { geometry: scene() };
+/** Runs the first block of JavaScript on a page. */
+async function runExample(page) {
+    const text = readFileSync(new URL(page, import.meta.url), 'utf8');
+    const example = new URL('./page-example.mjs', import.meta.url);
+    writeFileSync(example, text.split('```js\n')[1].split('```')[0].replace(/seconds: \d/, 'seconds: 0.1'));
     try {
-        await import(example.href);
+        await import(`${example.href}?${page}`);
     } finally {
         rmSync(example);
     }
+}
+
+test('the examples of the README and of the cookbook run', async () => {
+    globalThis.mesh = { geometry: scene() };
+    await runExample('../README.md');
     assert.ok(globalThis.mesh.geometry.boundsTree instanceof MeshBVH);
+    const shared = scene();
+    const parts = [new Mesh(shared), new Mesh(shared), new Mesh(scene())];
+    globalThis.model = new Group().add(...parts);
+    await runExample('../../../docs/use/COOKBOOK.md');
+    for (const { geometry } of parts) assert.ok(geometry.boundsTree instanceof MeshBVH);
 });
 
 test('wrong arguments and geometries are named', async () => {

@@ -270,6 +270,38 @@ def test_the_lines_of_the_readmes_run(tmp_path, monkeypatch, capsys):
     assert (names["t"], names["triangle"]) == ([3], [0])
 
 
+def recipes():
+    page = Path(__file__).parents[3] / "docs/use/COOKBOOK.md"
+    parts = page.read_text().split("\n## ")[1:]
+    blocks = ((part.split("\n")[0], part.split("```python\n")[1:]) for part in parts)
+    return {title: block.split("```")[0] for title, found in blocks for block in found}
+
+
+def test_the_recipes_of_the_cookbook_run(tmp_path, monkeypatch):
+    trimesh = pytest.importorskip("trimesh")
+    monkeypatch.chdir(tmp_path)
+    # Two houses beside each other, and a solid alone.
+    houses = [trimesh.creation.box((4, 4, height)).apply_translation((5 * x, 0, 0)) for x, height in enumerate((3, 9))]
+    trimesh.util.concatenate(houses).export("city.obj")
+    trimesh.creation.icosphere(subdivisions=2, radius=3).export("scene.obj")
+    names = {}
+    for title, text in recipes().items():
+        exec(text, names.setdefault(title, {}))
+    views = names["Sun hours on a city"]["views"]
+    up = names["Sun hours on a city"]["normals"][:, 2]
+    # The upper roof is free, the lower one is not, and nothing is seen from below.
+    np.testing.assert_allclose(np.sort(views[up > 0.9])[-2:], 1, atol=0.02)
+    assert views[up > 0.9].min() < 0.9
+    assert (views[up < -0.9] == 0).all()
+    inside = names["Is my point inside?"]
+    assert inside["tracer"].watertight and inside["inside"].tolist() == [True, False]
+    np.testing.assert_array_equal(inside["distance"] < 0, inside["inside"])
+    assert np.ptp(names["Replace embreex"]["places"][:, 2]) == pytest.approx(6)
+    particles = names["Trace in f64 without losing a particle"]
+    assert np.isinf(particles["t"]).all() and (particles["face"] == -1).all()
+    assert np.isfinite(particles["place"]).all()
+
+
 def test_an_interrupt_ends_a_search_which_keeps_its_gains():
     # Shells start jobs in the background with interrupts ignored, and then Python raises none.
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -76,6 +76,17 @@ pub enum Frames {
 }
 
 /// The frame that was chosen for a scene, and why.
+///
+/// ```
+/// use bvh_search::{Choice, prelude::*};
+/// // Walls that stand at 30 degrees in their file.
+/// let (sin, cos) = (0.5, 0.75f32.sqrt());
+/// let at = |x: f32, y: f32, z: f32| [x * cos - y * sin, x * sin + y * cos, z];
+/// let wall = |y: u8| [at(0.0, y.into(), 0.0), at(9.0, y.into(), 0.0), at(9.0, y.into(), 3.0)];
+/// let triangles: Vec<Triangle> = (0..200).map(|y| wall(y).into()).collect();
+/// let choice = Choice::of(&triangles, Budget::UNLIMITED, &());
+/// assert!(choice.frame.is_some() && choice.gain > 0.1);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
     /// The frame; `None` for the file's axes.

@@ -11,6 +11,14 @@ use bvh_core::{Aabb, PackedAabb, cost::Sum};
 /// or more inner nodes above `k` of the objects, not counting the root, if these are all objects,
 /// and k − 1 or more otherwise: k paths to the root join in k − 1 nodes, and any other object joins
 /// them in one more. Choose the `k` objects of area t or more, and integrate over t. ∎
+///
+/// ```
+/// use bvh_search::{lower_bound, prelude::*};
+/// let boxes = vec![Aabb::from([[0.0; 3], [1.0; 3]]); 5];
+/// let tree = median_cut::Config::default().build(&boxes)?;
+/// assert_eq!(lower_bound::of_largest(&boxes), cost::internal_area(&tree), "no tree is better");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn of_largest(boxes: &[Aabb]) -> f64 {
     if boxes.len() < 2 {
         return 0.0;

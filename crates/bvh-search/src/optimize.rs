@@ -23,6 +23,16 @@ use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate, validate_refere
 /// leaves. The boxes are then the boxes of the objects or of their parts.
 ///
 /// Rejects trees that are not [valid](validate), and inner nodes with more than two children.
+///
+/// ```
+/// use bvh_search::prelude::*;
+/// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// let tree = median_cut::Config::default().build(&boxes)?;
+/// let budget = Budget { max_work: Some(100_000), ..Budget::UNLIMITED };
+/// let better = optimize(&tree, &Problem::new(&boxes), &best::Config::default(), 7, budget, &())?;
+/// assert!(cost::internal_area(&better.tree) <= cost::internal_area(&tree));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn optimize(
     tree: &Bvh,
     problem: &Problem,

@@ -54,6 +54,18 @@ impl Default for Options<'_> {
 }
 
 /// The tree of a [`Bake`], with its objects.
+///
+/// ```
+/// use bvh_search::{Objects, Options, OwnedTree, bvh_core::Primitives, prelude::*};
+/// let at = |x: f32| [[x, 0.0, 0.0], [x + 1.5, 1.0, 0.0], [x, 1.0, 2.0]];
+/// let shapes = Primitives::Triangles((0..50u8).map(|x| at(x.into()).into()).collect());
+/// let budget = Budget { max_work: Some(100_000), ..Budget::UNLIMITED };
+/// let options = Options { budget, ..Options::default() };
+/// let tree = OwnedTree::find(Objects::Shapes(shapes.clone()), &options, &())?;
+/// let loaded = OwnedTree::load(Objects::Shapes(shapes), &tree.save()?)?;
+/// assert_eq!(loaded.tree(), tree.tree());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct OwnedTree {
     tree: Bvh,

@@ -7,6 +7,16 @@ use bvh_core::Aabb;
 /// Returns the [shortcuts](Shortcut) of a whole scene, each with what is skipped and why. More may
 /// follow later: orders may become equal further down the tree, and a search may meet the bound.
 /// O(n), with the radix sort of builders and searches.
+///
+/// ```
+/// use bvh_search::{shortcuts, prelude::*};
+/// let on_a_line: Vec<Aabb> = (0..99u8).map(|x| Aabb::from([[x.into(), 0.0, 0.0]; 2])).collect();
+/// for (shortcut, why) in shortcuts::of(&on_a_line)? {
+///     println!("{shortcut:?}: {why}");
+/// }
+/// assert!(!shortcuts::of(&on_a_line)?.is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn of(boxes: &[Aabb]) -> Result<Vec<(Shortcut, String)>, BuildError> {
     const AXES: [&str; 3] = ["x", "y", "z"];
     let sorted = Presorted::new(boxes)?;

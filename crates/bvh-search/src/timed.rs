@@ -28,6 +28,15 @@ pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
 /// [internal area](bvh_core::cost::internal_area) over the root's area, or of
 /// [`WideBvh::expected_visits`](bvh_core::WideBvh::expected_visits), measures how far refitting has
 /// degraded the tree. Accepts the same trees as [`optimize`](crate::optimize()).
+///
+/// ```
+/// use bvh_search::prelude::*;
+/// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// let greedy = muller_fellner::Config::default().build(&boxes)?;
+/// let better = improve(&greedy, &boxes, Duration::from_millis(10))?.tree;
+/// assert!(cost::internal_area(&better) <= cost::internal_area(&greedy));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn improve(tree: &Bvh, boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
     let bake = Bake { start: Some(tree), ..Bake::new(boxes) };
     Ok(bake.search(None, &Deadline::after(time))?.outcome)

@@ -126,7 +126,7 @@ fn unbound(text: &str) -> Vec<String> {
 
 #[test]
 fn what_readers_begin_with_is_short_and_its_numbers_are_bound() {
-    for name in ["README.md", "docs/CHOOSING.md"] {
+    for name in ["README.md", "docs/use/CHOOSING.md", "docs/use/COOKBOOK.md"] {
         let text = fs::read_to_string(top().join(name)).unwrap();
         assert_eq!(unbound(&text), [""; 0], "{name}: numbers without an id of docs/numbers.toml");
     }
@@ -153,7 +153,7 @@ fn the_index_of_results_has_every_experiment_with_its_question() {
 
 #[test]
 fn the_page_of_tracers_has_every_target_and_whether_its_trees_divide_triangles() {
-    let page = fs::read_to_string(top().join("docs/INTEROP.md")).unwrap();
+    let page = fs::read_to_string(top().join("docs/use/INTEROP.md")).unwrap();
     let rows = page.lines().skip_while(|line| !line.starts_with("| `--for` |")).skip(2);
     let rows = rows.map_while(|line| {
         let columns: Vec<&str> = line.split('|').map(str::trim).collect();
@@ -199,5 +199,5 @@ fn a_file_name_means_the_same_columns_in_every_experiment_and_a_page_describes_t
         let known = headers.entry(name).or_insert_with(|| header.clone());
         assert_eq!(*known, header, "{}", path.display());
     }
-    assert_current(&top().join("docs/COLUMNS.md"), &columns::page(&headers), "docs");
+    assert_current(&top().join("docs/evidence/COLUMNS.md"), &columns::page(&headers), "docs");
 }

@@ -16,13 +16,13 @@ pub fn top() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The pages at the top, of `docs/`, of `results/`, and of the crates.
+/// The pages at the top, of the two folders of `docs/`, of `results/`, and of the crates.
 pub fn pages() -> Vec<PathBuf> {
     let mut pages = vec![top().join("results/README.md")];
     let crates = fs::read_dir(top().join("crates")).unwrap();
     let of_crates = crates.map(|entry| entry.unwrap().path().join("README.md"));
     pages.extend(of_crates.filter(|page| page.is_file()));
-    for folder in [top(), top().join("docs")] {
+    for folder in [top(), top().join("docs/use"), top().join("docs/evidence")] {
         let entries = fs::read_dir(folder).unwrap();
         pages.extend(entries.map(|entry| entry.unwrap().path()));
     }

@@ -8,6 +8,18 @@ use crate::{Aabb, Bvh, Node, file};
 use bytemuck::NoUninit;
 
 /// A tracer that traces rays through a ready tree.
+///
+/// ```
+/// # use bvh_core::{Aabb, Bvh, Node, export::Target};
+/// # let boxes = [Aabb::from([[0.0; 3], [1.0; 3]])];
+/// # let tree = Bvh::new(vec![Node::leaf(boxes[0], 0, 1)], vec![0]);
+/// let target = Target::named("three-mesh-bvh")?;
+/// let fitted = target.fit(&tree);
+/// target.check(&fitted, boxes.len(), false)?;
+/// let file = target.bytes(&fitted, &boxes);
+/// assert!(file.len() > 32, "a header and nodes");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     /// The name of the library.

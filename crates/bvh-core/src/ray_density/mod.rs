@@ -60,6 +60,17 @@ const LENGTHENED: f64 = 0.25;
 /// [module](self).
 ///
 /// Takes about 11 MB for any number of segments. A clone copies this memory.
+///
+/// ```
+/// # use bvh_core::{Aabb, RayDensity, Segment};
+/// let scene = Aabb::from([[0.0; 3], [8.0; 3]]);
+/// let rays = [1.0, 2.0, 3.0].map(|y| Segment { from: [-1.0, y, 1.0], to: [4.0, y, 1.0] });
+/// let density = RayDensity::of_rays(&scene, &rays, 0.1)?;
+/// let [front, back] = [0.0, 6.0].map(|x| Aabb::from([[x, 0.0, 0.0], [x + 2.0, 8.0, 8.0]]));
+/// assert!(density.entries(&front) > 2.9 && density.entries(&back) == 0.0);
+/// assert!(density.measure(&front) > density.measure(&back));
+/// # Ok::<(), bvh_core::DensityError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct RayDensity {
     /// The lower corner of the grid, in world units, and 0.

@@ -27,6 +27,18 @@ impl WideBvh {
     /// Writes the [nearest hit](Self::nearest_hit) of every ray to `hits`; [`Hit::MISS`] for a ray
     /// that meets nothing.
     ///
+    /// ```
+    /// # use bvh_core::{Bvh, Coherence, Hit, Node, Ray, Triangle, WideBvh};
+    /// let triangles = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]].map(Triangle::from);
+    /// # let tree = Bvh::new(vec![Node::leaf(triangles[0].aabb(), 0, 1)], vec![0]);
+    /// let wide = WideBvh::new(&tree, &triangles)?;
+    /// let rays = [0.2, 0.9].map(|x| Ray::half_line([x, 0.2, 3.0], [0.0, 0.0, -1.0]).unwrap());
+    /// let mut hits = [Hit::MISS; 2];
+    /// wide.nearest_hits(&rays, &mut hits, Coherence::Coherent);
+    /// assert_eq!(hits, [Hit { t: 3.0, object: 0 }, Hit::MISS]);
+    /// # Ok::<(), bvh_core::InvalidBvh>(())
+    /// ```
+    ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
     pub fn nearest_hits(&self, rays: &[Ray], hits: &mut [Hit], coherence: Coherence) {
@@ -37,6 +49,19 @@ impl WideBvh {
     }
 
     /// Writes to `hits` whether each ray meets [any triangle](Self::any_hit).
+    ///
+    /// ```
+    /// # use bvh_core::{Bvh, Coherence, Node, Ray, Triangle, WideBvh};
+    /// let triangles = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]].map(Triangle::from);
+    /// # let tree = Bvh::new(vec![Node::leaf(triangles[0].aabb(), 0, 1)], vec![0]);
+    /// let wide = WideBvh::new(&tree, &triangles)?;
+    /// // Shadow rays: is anything between a point and a light?
+    /// let rays = [-1.0, 1.0].map(|z| Ray::new([0.2, 0.2, z], [0.0, 0.0, 5.0 - z], 0.0, 1.0).unwrap());
+    /// let mut is_hidden = [false; 2];
+    /// wide.any_hits(&rays, &mut is_hidden, Coherence::Incoherent);
+    /// assert_eq!(is_hidden, [true, false]);
+    /// # Ok::<(), bvh_core::InvalidBvh>(())
+    /// ```
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.

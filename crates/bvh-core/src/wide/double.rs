@@ -49,6 +49,22 @@ use std::borrow::Cow;
 ///
 /// Gives the answers of testing every triangle by [`DTriangle::intersect`], bit by bit, on every
 /// machine and with every [`Kernel`]. Boxes are those of a [`WideBvh`].
+///
+/// ```
+/// # use bvh_core::{Bvh, DRay, DTriangle, DWideBvh, Node, Select};
+/// // A triangle at map coordinates, which f32 would move by a quarter.
+/// let at = [5.0e6, 5.0e5, 100.0];
+/// # let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let triangles = [DTriangle(corners.map(|c| [0, 1, 2].map(|i| at[i] + c[i]).into()))];
+/// let frame = DWideBvh::centred(&triangles);
+/// let boxes = DWideBvh::boxes(&triangles, &frame); // for any builder
+/// # let tree = Bvh::new(vec![Node::leaf(boxes[0], 0, 1)], vec![0]);
+/// let wide = DWideBvh::new(&Bvh { frame: Some(frame), ..tree }, &triangles)?;
+/// let ray = DRay::half_line([at[0] + 0.1, at[1] + 0.1, 103.0], [0.0, 0.0, -1.0])?;
+/// assert_eq!(wide.nearest_hit(&ray, Select::default()).map(|hit| hit.t), Some(3.0));
+/// assert!(!wide.any_hit(&ray, Select { exclude: &[0], ..Select::default() }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct DWideBvh {
     /// The triangles in f32, in the frame.

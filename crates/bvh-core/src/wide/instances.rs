@@ -10,27 +10,6 @@
 //! Compared with the same scene whose triangles are all written out, distances differ by the
 //! rounding of the moved rays and of the moved corners, about 10⁻⁷ of the coordinates. They do not
 //! differ if transforms do not round: translations by whole numbers and turns by right angles.
-//!
-//! ```
-//! use bvh_core::{Aabb, Bvh, Instance, InstanceHit, Instances, Node, Ray, Triangle, WideBvh, boxes};
-//! use glam::{Affine3A, Vec3};
-//! let triangles = [Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])];
-//! let aabb = boxes(&triangles)[0];
-//! let part = WideBvh::new(&Bvh::new(vec![Node::leaf(aabb, 0, 1)], vec![0]), &triangles)?;
-//! let parts = vec![part];
-//! let moved = |z| Instance { part: 0, transform: Affine3A::from_translation(Vec3::Z * z) };
-//! let instances = vec![moved(0.0), moved(4.0)];
-//! // Any builder of `bvh-build` can make the tree over these boxes. Here it is a single leaf.
-//! let boxes = Instance::boxes(&instances, &parts)?;
-//! let top = Bvh::new(vec![Node::leaf(boxes[0].union(&boxes[1]), 0, 2)], vec![0, 1]);
-//! let mut scene = Instances::new(parts, instances, top)?;
-//! let ray = Ray::half_line([0.2, 0.2, 9.0], [0.0, 0.0, -1.0]).unwrap();
-//! assert_eq!(scene.nearest_hit(&ray), Some(InstanceHit { t: 5.0, instance: 1, triangle: 0 }));
-//! // The next frame.
-//! scene.refit(&[moved(6.0), moved(4.0)])?;
-//! assert_eq!(scene.nearest_hit(&ray), Some(InstanceHit { t: 3.0, instance: 0, triangle: 0 }));
-//! # Ok::<(), bvh_core::InvalidInstances>(())
-//! ```
 
 use super::layout::WideBvh;
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, any_hit_by, nearest_hit_by, validate};
@@ -191,6 +170,27 @@ impl InstanceHit {
 }
 
 /// A scene of instances for tracing.
+///
+/// ```
+/// # use bvh_core::{Aabb, Bvh, Instance, InstanceHit, Instances, Node, Ray, Triangle, WideBvh, boxes};
+/// # use glam::{Affine3A, Vec3};
+/// # let triangles = [Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])];
+/// # let aabb = boxes(&triangles)[0];
+/// # let part = WideBvh::new(&Bvh::new(vec![Node::leaf(aabb, 0, 1)], vec![0]), &triangles)?;
+/// let parts = vec![part];
+/// let moved = |z| Instance { part: 0, transform: Affine3A::from_translation(Vec3::Z * z) };
+/// let instances = vec![moved(0.0), moved(4.0)];
+/// // Any builder of `bvh-build` can make the tree over these boxes. Here it is a single leaf.
+/// let boxes = Instance::boxes(&instances, &parts)?;
+/// let top = Bvh::new(vec![Node::leaf(boxes[0].union(&boxes[1]), 0, 2)], vec![0, 1]);
+/// let mut scene = Instances::new(parts, instances, top)?;
+/// let ray = Ray::half_line([0.2, 0.2, 9.0], [0.0, 0.0, -1.0]).unwrap();
+/// assert_eq!(scene.nearest_hit(&ray), Some(InstanceHit { t: 5.0, instance: 1, triangle: 0 }));
+/// // The next frame.
+/// scene.refit(&[moved(6.0), moved(4.0)])?;
+/// assert_eq!(scene.nearest_hit(&ray), Some(InstanceHit { t: 3.0, instance: 0, triangle: 0 }));
+/// # Ok::<(), bvh_core::InvalidInstances>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Instances {
     parts: Vec<Arc<WideBvh>>,

@@ -93,6 +93,17 @@ impl WideBvh {
     /// Source: Ylitie, Karras & Laine 2017, 'Efficient incoherent ray traversal on GPUs through
     /// compressed wide BVHs', section 4.1. Differs from the paper: boxes in full precision; leaves
     /// of any size, paid per block of four.
+    ///
+    /// ```
+    /// # use bvh_core::{Bvh, Hit, Node, Ray, Triangle, WideBvh};
+    /// let triangles = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]].map(Triangle::from);
+    /// # let tree = Bvh::new(vec![Node::leaf(triangles[0].aabb(), 0, 1)], vec![0]);
+    /// // The tree is of any builder of `bvh-build`, or of a search of `bvh-search`.
+    /// let wide = WideBvh::new(&tree, &triangles)?;
+    /// let ray = Ray::half_line([0.2, 0.2, 3.0], [0.0, 0.0, -1.0]).unwrap();
+    /// assert_eq!(wide.nearest_hit(&ray), Some(Hit { t: 3.0, object: 0 }));
+    /// # Ok::<(), bvh_core::InvalidBvh>(())
+    /// ```
     pub fn new(tree: &Bvh, triangles: &[Triangle]) -> Result<Self, InvalidBvh> {
         Self::made(tree, triangles, None)
     }

@@ -24,6 +24,18 @@ impl WideBvh {
     /// time to find them grows with the [cost](Self::expected_visits). Of split references every
     /// part gets the box of its whole triangle. O(n), and much faster than a new layout. A refused
     /// layout is unchanged.
+    ///
+    /// ```
+    /// # use bvh_core::{Bvh, Hit, Node, Ray, Triangle, WideBvh};
+    /// let triangles = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]].map(Triangle::from);
+    /// # let tree = Bvh::new(vec![Node::leaf(triangles[0].aabb(), 0, 1)], vec![0]);
+    /// let mut wide = WideBvh::new(&tree, &triangles)?;
+    /// let moved = triangles.map(|triangle| Triangle(triangle.0.map(|corner| corner + 1.0)));
+    /// wide.refit(&moved)?;
+    /// let ray = Ray::half_line([1.2, 1.2, 3.0], [0.0, 0.0, -1.0])?;
+    /// assert_eq!(wide.nearest_hit(&ray), Some(Hit { t: 2.0, object: 0 }));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn refit(&mut self, triangles: &[Triangle]) -> Result<(), RefitError> {
         let mut is_new = vec![true; triangles.len()];
         for block in self.blocks.iter() {

@@ -125,7 +125,7 @@ class Tree:
         """
     def export(self, tracer: str, *, divided: bool = False) -> bytes:
         """Returns the file of `bvh export` for the tracer of another library, by its name there
-        (docs/INTEROP.md). A query for all hits of three-mesh-bvh, of the crate bvh and of a reader of
+        (docs/use/INTEROP.md). A query for all hits of three-mesh-bvh, of the crate bvh and of a reader of
         json finds a divided triangle more than once: `divided=True` says that yours are for the
         nearest or any hit. Otherwise such a tree is rejected.
 

@@ -5,6 +5,16 @@ use crate::tuning::MOST_SUBTREES;
 
 bvh_config::config! {
     /// The length of the search, and its division.
+    ///
+    /// ```
+    /// use bvh_search::prelude::*;
+    /// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+    /// let budget = Budget { max_work: Some(100_000), ..Budget::UNLIMITED };
+    /// let found = solve(&best::Config::default(), &Problem::new(&boxes), 7, budget, &())?;
+    /// let again = solve(&best::Config::default(), &Problem::new(&boxes), 7, budget, &())?;
+    /// assert_eq!(found.tree, again.tree, "the same seed and work");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub struct Config {
         /// Work per object of the whole search, unless the budget has less or the
         /// [`horizon`](Self::horizon) is known.

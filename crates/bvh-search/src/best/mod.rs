@@ -1,6 +1,6 @@
 //! `best`: the methods that pay, in the order that pays, for any budget.
 //!
-//! The section "The portfolio `best`" of `docs/METHODS.md` shows the plan, with a picture. In
+//! The section "The portfolio `best`" of `docs/evidence/METHODS.md` shows the plan. In
 //! short: the [exact solver](crate::exact) for a few objects; clustering and reinsertion of the
 //! largest nodes in milliseconds (`small_budget`); one long run of
 //! [annealed ruin and recreate](crate::ruin_recreate) and short runs after it if the end is known,

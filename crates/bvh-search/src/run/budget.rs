@@ -5,6 +5,16 @@ use std::ops::AddAssign;
 /// Limits in machine-independent units; `None` is no limit. A limit in seconds is a
 /// [`Deadline`](crate::Deadline), or any other [`Observer`](crate::Observer) that cancels. There is
 /// no default: without any limit, [`best`](crate::best) takes hours.
+///
+/// ```
+/// use bvh_search::prelude::*;
+/// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// // The same tree on every machine.
+/// let budget = Budget { max_work: Some(100_000), ..Budget::UNLIMITED };
+/// let outcome = solve(&best::Config::default(), &Problem::new(&boxes), 7, budget, &())?;
+/// assert!(outcome.work <= 100_000);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",

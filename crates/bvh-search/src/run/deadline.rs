@@ -7,6 +7,14 @@ use std::time::{Duration, Instant};
 ///
 /// The search reads the clock through [`Observer`]: it plans with the elapsed fraction of the limit
 /// and ends soon after the limit. No second thread is needed.
+///
+/// ```
+/// use bvh_search::{Bake, prelude::*};
+/// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// let tree = Bake::new(&boxes).search(None, &Deadline::after(Duration::from_millis(10)))?.outcome.tree;
+/// validate(&tree, &boxes)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Deadline {
     start: Instant,

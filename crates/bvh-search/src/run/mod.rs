@@ -251,6 +251,16 @@ pub struct Outcome {
 /// from `seed`. The outcome never costs more than any tree built during the search.
 ///
 /// A cancelled search returns soon, even during a construction.
+///
+/// ```
+/// use bvh_search::{grasp, prelude::*};
+/// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// // The best of ten randomised divisions.
+/// let search = grasp::Config { trials: 10, ..Default::default() };
+/// let outcome = solve(&search, &Problem::new(&boxes), 7, Budget::UNLIMITED, &())?;
+/// validate(&outcome.tree, &boxes)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn solve(
     search: &dyn Search,
     problem: &Problem,

@@ -34,6 +34,16 @@ impl<'a> Splits<'a> {
 }
 
 /// The problem: find the tree of least cost over `boxes`.
+///
+/// ```
+/// use bvh_search::{exact, prelude::*};
+/// let boxes: Vec<Aabb> = (0..9u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// let problem = Problem { objective: Objective::InternalArea, ..Problem::new(&boxes) };
+/// let optimum = solve(&exact::Config {}, &problem, 0, Budget::UNLIMITED, &())?;
+/// let greedy = muller_fellner::Config::default().build(&boxes)?;
+/// assert!(cost::internal_area(&optimum.tree) <= cost::internal_area(&greedy));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
     /// One box per object.

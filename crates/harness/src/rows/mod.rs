@@ -1,7 +1,7 @@
 //! The rows of the CSV files: flat, units in the names, full precision.
 //!
 //! Columns mean the same in every file: a comment on the first field of a name holds for the others.
-//! `docs/COLUMNS.md` is made of these comments.
+//! `docs/evidence/COLUMNS.md` is made of these comments.
 #![allow(missing_docs, reason = "columns that are described at their first occurrence")]
 
 pub mod csv_file;

@@ -1,4 +1,4 @@
-//! The dictionary of columns, `docs/COLUMNS.md`: what the comments on the fields of rows, and the
+//! The dictionary of columns, `docs/evidence/COLUMNS.md`: what the comments on the fields of rows, and the
 //! columns of queries in specs, say of the columns of committed CSV files.
 
 use crate::support::{experiments, top};

@@ -22,12 +22,14 @@ fn every_block_has_a_language_whose_examples_are_run() {
             block.place(),
             block.language
         );
-        // `scripts/languages` compiles and runs the C example, pytest and node run the others. Two
-        // lines in the README show what the page of the npm package explains.
+        // `scripts/languages` compiles and runs the C example, pytest and node run the others, also
+        // those of the cookbook. Two lines in the README show what the page of the npm package
+        // explains.
         for language in ["c", "python", "js"] {
             let page = fs::canonicalize(&block.page).unwrap();
             let is_run = page.ends_with(format!("crates/bvh-{language}/README.md"))
-                || language != "c" && page == fs::canonicalize(top().join("README.md")).unwrap();
+                || language != "c" && page == fs::canonicalize(top().join("README.md")).unwrap()
+                || language != "c" && page.ends_with("docs/use/COOKBOOK.md");
             assert!(block.language != language || is_run, "{}", block.place());
         }
     }
@@ -111,7 +113,7 @@ fn every_command_of_a_block_names_what_is_there_and_is_read_by_the_program() {
 /// Asserts that the files in a command of the project exist.
 fn check_files(command: &[String], place: &str) {
     let known =
-        ["bvh", "c++", "cargo", "cd", "cmake", "export", "harness", "node", "npm", "rustup"];
+        ["bvh", "c++", "cargo", "cd", "cmake", "cmp", "export", "harness", "node", "npm", "rustup"];
     let program = &command[0];
     let is_there = known.contains(&program.as_str()) || top().join(program).is_file();
     assert!(is_there, "{place}: `{program}`");
