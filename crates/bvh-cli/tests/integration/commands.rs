@@ -147,7 +147,7 @@ sky mesh.obj --out=x.csv --directions=yxz.csv ! yxz.csv: line 1 is | y,x,z | fir
 sky mesh.obj --out=x.csv --points=yxz.csv ! yxz.csv: line 1 is | y,x,z
 sky mesh.obj --out=x.csv --points=away.csv --per=vertex ! --points | --per
 sky mesh.obj --out=x.csv --points=heavy.csv ! heavy.csv: line 1 is | 0,0,1,1 | x,y,z,nx,ny,nz
-sky mesh.obj --out=x.csv --points=mesh.obj ! mesh.obj: --points accepts | .npy or .ply
+sky mesh.obj --out=x.csv --points=mesh.obj ! mesh.obj: --points accepts | .csv or .npy
 sky mesh.obj --out=x.csv --points=mesh.ply ! mesh.ply
 sky mesh.obj --out=x.png --per=vertex ! a point in each pixel | .glb
 sky mesh.obj --out=x.csv --column=hours ! no column | hours | accepted: sky_view_factor
