@@ -123,7 +123,7 @@ CALLS = {
 
 # Parameters that are no arrays of numbers.
 OTHERS = {"self", "seconds", "references", "seed", "work", "progress", "path", "kind", "coherent", "invalid", "tracer"}
-OTHERS |= {"cosine", "precision", "orientation", "by", "frame", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
+OTHERS |= {"divided", "cosine", "precision", "orientation", "by", "frame", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
 
 
 def unaligned(array):
