@@ -154,8 +154,9 @@ impl World {
             1 => (a + b) * 0.5,
             _ => from + DVec3::from_array(random.random()) - 0.5,
         };
-        // A particle may be at the corner.
-        if to == from { DVec3::X } else { to - from }
+        // A particle may be at the corner, or so near to it that there is no ray from one to the other.
+        let towards = to - from;
+        if towards.abs().max_element() < 1e-30 { DVec3::X } else { towards }
     }
 
     /// Flies particles from places in the outermost sphere until they are outside or lost.
