@@ -2,7 +2,7 @@
 
 use crate::double::BvsTracerF64;
 use crate::failure::{BvsStatus, Failure, given, slice, slice_mut, status};
-use crate::tracer::{BATCH, BvsTracer};
+use crate::tracer::BvsTracer;
 use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::bvh_core::{DRay, Sky, Traced, View, neighbours};
 use bvh_search::prelude::*;
@@ -130,7 +130,7 @@ unsafe fn visible<L: Traced>(
     }
     for (name, vectors) in [("points", points), ("normals", normals)] {
         for (index, &vector) in vectors.iter().enumerate() {
-            let found = L::double(vector);
+            let found: DVec3 = vector.into();
             // NaN fails every comparison.
             if !found.abs().cmple(DVec3::splat(most)).all() {
                 let message =
@@ -141,22 +141,15 @@ unsafe fn visible<L: Traced>(
     }
     let normals = (normals.len() == count).then_some(normals);
     let cosines = normals.filter(|_| cosine != 0);
-    let order = neighbours(layout, points);
-    let mut rows = vec![0; words * count.min(BATCH)];
-    for order in order.chunks(BATCH) {
-        let rows = &mut rows[..words * order.len()];
-        sky.visible(layout, View { points, normals }, order, rows);
-        for (number, &point) in order.iter().enumerate() {
-            let (row, point) = (&rows[words * number..][..words], point as usize);
-            if !bits.is_empty() {
-                bits[words * point..][..words].copy_from_slice(row);
-            }
-            if !sums.is_empty() {
-                let normal = cosines.map(|normals| L::double(normals[point]));
-                let found = sky.sums(row, normal);
-                sums[columns * point..][..columns].copy_from_slice(&found);
-            }
+    sky.visible(layout, View { points, normals }, &neighbours(points), |point, row| {
+        if !bits.is_empty() {
+            bits[words * point..][..words].copy_from_slice(row);
         }
-    }
+        if !sums.is_empty() {
+            let normal = cosines.map(|normals| normals[point].into());
+            let found = sky.sums(row, normal);
+            sums[columns * point..][..columns].copy_from_slice(&found);
+        }
+    });
     Ok(())
 }

@@ -63,6 +63,15 @@ fn is_exact(point: DVec3) -> bool {
     point.to_array().iter().all(|&x| x == 0.0 || (DRay::LEAST..=DRay::MOST).contains(&x.abs()))
 }
 
+/// Returns the axis of a direction's largest component, the lowest on ties, without a branch that
+/// the processor could not predict.
+#[inline(always)]
+pub(crate) fn largest_axis(direction: DVec3) -> usize {
+    let [x, y, z] = direction.abs().to_array();
+    let axis = usize::from(y > x);
+    if z > x.max(y) { 2 } else { axis }
+}
+
 impl DRay {
     /// The least size of a coordinate but 0: 2⁻¹⁵⁰.
     pub const LEAST: f64 = 1.0 / (1u128 << 75) as f64 / (1u128 << 75) as f64;

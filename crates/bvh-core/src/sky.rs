@@ -20,12 +20,9 @@ use glam::DVec3;
 /// let wide = WideBvh::new(&tree, &wall)?;
 /// let sky = Sky::new(vec![DVec3::X, DVec3::Z], [0.0, f64::INFINITY])?;
 /// let view = View { points: &[[0.0, 0.0, 1.0], [2.0, 0.0, 1.0]].map(Into::into), normals: None };
-/// let order = neighbours(&wide, view.points);
-/// let mut free = vec![0; view.points.len() * sky.words()];
-/// sky.visible(&wide, view, &order, &mut free);
-/// for (row, point) in free.iter().zip(order) {
-///     assert_eq!(*row, [0b10, 0b11][point as usize]);
-/// }
+/// sky.visible(&wide, view, &neighbours(view.points), |point, row| {
+///     assert_eq!(row, [[0b10], [0b11]][point]);
+/// });
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -78,8 +75,8 @@ pub struct View<'a, P> {
 
 /// Returns the numbers of points in an order in which neighbours follow each other: the order of the
 /// leaves of a tree that halves them along their longest extent. O(n log n) time.
-pub fn neighbours<L: Traced>(_layout: &L, points: &[L::Point]) -> Vec<u32> {
-    let points: Vec<DVec3> = points.iter().map(|&point| L::double(point)).collect();
+pub fn neighbours<P: Copy + Into<DVec3>>(points: &[P]) -> Vec<u32> {
+    let points: Vec<DVec3> = points.iter().map(|&point| point.into()).collect();
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     // Pairs of a beginning and an end.
     let mut open = vec![(0, order.len())];
@@ -213,35 +210,31 @@ impl Sky {
         self.directions.len().div_ceil(64)
     }
 
-    /// Writes a row of [`words`](Self::words) for each of some points: direction `j` is free where
-    /// the bit `j % 64` of word `j / 64` is set. A direction is free where no triangle is in the
-    /// range, exactly as [`any_hit`](crate::WideBvh::any_hit) says.
+    /// Passes for each of some points its number and a row of [`words`](Self::words): direction `j`
+    /// is free where the bit `j % 64` of word `j / 64` is set. A direction is free where no triangle
+    /// is in the range, exactly as [`any_hit`](crate::WideBvh::any_hit) says.
     ///
     /// `order` has the numbers of the points; fastest where [`neighbours`] follow each other.
     /// Memory for 64 points at a time.
     ///
     /// # Panics
-    /// If there are not as many rows as numbers, or not as many normals as points.
+    /// If there are not as many normals as points, or fewer points than a number says.
     pub fn visible<L: Traced>(
         &self,
         layout: &L,
         view: View<'_, L::Point>,
         order: &[u32],
-        free: &mut [u64],
+        mut row: impl FnMut(usize, &[u64]),
     ) {
         let words = self.words();
-        assert_eq!(free.len(), order.len() * words, "a row for every point");
         if let Some(normals) = view.normals {
             assert_eq!(normals.len(), view.points.len(), "a normal for every point");
         }
-        free.fill(0);
-        if words == 0 {
-            return;
-        }
+        let (directions, range) = L::as_of_rays(&self.directions, self.range);
         let mut points = Vec::with_capacity(POINTS_OF_BEAM);
         let mut normals = Vec::with_capacity(POINTS_OF_BEAM);
-        let groups = order.chunks(POINTS_OF_BEAM).zip(free.chunks_mut(POINTS_OF_BEAM * words));
-        for (numbers, rows) in groups {
+        let mut rows = vec![0; POINTS_OF_BEAM * words];
+        for numbers in order.chunks(POINTS_OF_BEAM) {
             let at = |from: &[L::Point], to: &mut Vec<L::Point>| {
                 to.clear();
                 to.extend(numbers.iter().map(|&number| from[number as usize]));
@@ -249,7 +242,8 @@ impl Sky {
             at(view.points, &mut points);
             view.normals.iter().for_each(|from| at(from, &mut normals));
             let above = view.normals.map(|_| &normals[..]);
-            layout.look(&points, above, &self.directions, self.range, &mut |direction, bits| {
+            rows.fill(0);
+            layout.look(&points, above, &directions, range, &mut |direction, bits| {
                 let mut bits = bits;
                 while bits != 0 {
                     let point = bits.trailing_zeros() as usize;
@@ -257,6 +251,9 @@ impl Sky {
                     bits &= bits - 1;
                 }
             });
+            for (place, &number) in numbers.iter().enumerate() {
+                row(number as usize, &rows[place * words..][..words]);
+            }
         }
     }
 

@@ -123,7 +123,7 @@ impl Solid {
             Turns::Angles(winding) => {
                 let mut open = Open::default();
                 for (point, inside) in points.iter().zip(inside) {
-                    let point = L::double(*point);
+                    let point: DVec3 = (*point).into();
                     *inside = point.is_finite() && winding.is_inside(point, &mut open);
                 }
             }
@@ -180,10 +180,7 @@ fn sorted_edges(triangles: &[[DVec3; 3]]) -> Vec<Edge> {
 /// A layout in f32 or in f64.
 pub trait Traced {
     /// A point. In f64, coordinates count as those of a [ray](DRay::new).
-    type Point: Copy;
-
-    /// Returns the point in f64.
-    fn double(point: Self::Point) -> DVec3;
+    type Point: Copy + Into<DVec3>;
 
     /// Returns the triangles that the half line from every point along +x crosses, point after
     /// point, and writes how many there are of each.
@@ -192,7 +189,11 @@ pub trait Traced {
     /// Writes the closest point of every point.
     fn closest_to(&self, points: &[Self::Point], closest: &mut [Option<Closest>]);
 
-    /// Passes for each direction its number and a bit for each of at most 64 points from which it is
+    /// Returns directions and a range of distances as rays have them.
+    #[doc(hidden)]
+    fn as_of_rays(directions: &[DVec3], range: [f64; 2]) -> (Vec<DVec3>, [f64; 2]);
+
+    /// Passes for each of these directions its number and a bit for each of at most 64 points from which it is
     /// free over a range, and above the surface if there are normals.
     #[doc(hidden)]
     fn look(
@@ -207,10 +208,6 @@ pub trait Traced {
 
 impl Traced for WideBvh {
     type Point = Vec3;
-
-    fn double(point: Vec3) -> DVec3 {
-        point.as_dvec3()
-    }
 
     fn crossed(&self, points: &[Vec3], counts: &mut [u32]) -> Vec<u32> {
         // The half line must not end before a far wall: a mesh may be twice as wide as the largest
@@ -233,6 +230,11 @@ impl Traced for WideBvh {
         self.closest_points(points, closest);
     }
 
+    fn as_of_rays(directions: &[DVec3], range: [f64; 2]) -> (Vec<DVec3>, [f64; 2]) {
+        let directions = directions.iter().map(|direction| direction.as_vec3().into()).collect();
+        (directions, range.map(|t| f64::from(t as f32)))
+    }
+
     fn look(
         &self,
         points: &[Vec3],
@@ -247,10 +249,6 @@ impl Traced for WideBvh {
 
 impl Traced for DWideBvh {
     type Point = DVec3;
-
-    fn double(point: DVec3) -> DVec3 {
-        point
-    }
 
     fn crossed(&self, points: &[DVec3], counts: &mut [u32]) -> Vec<u32> {
         let half_line = |&point: &DVec3| {
@@ -268,6 +266,10 @@ impl Traced for DWideBvh {
         self.closest_points(points, closest);
     }
 
+    fn as_of_rays(directions: &[DVec3], range: [f64; 2]) -> (Vec<DVec3>, [f64; 2]) {
+        (directions.iter().map(|&direction| DRay::exact(direction)).collect(), range)
+    }
+
     fn look(
         &self,
         points: &[DVec3],
@@ -276,8 +278,6 @@ impl Traced for DWideBvh {
         range: [f64; 2],
         free: &mut dyn FnMut(usize, u64),
     ) {
-        let directions: Vec<DVec3> = directions.iter().map(|&d| DRay::exact(d)).collect();
-        let directions = &directions[..];
         Beams { obstacles: self, points, normals, directions, range }.trace(free);
     }
 }

@@ -1,24 +1,19 @@
 //! The answers to batches of rays and points, on all threads.
 
-use crate::precision::Real;
+use crate::arrays::{Column, Rows};
+use crate::precision::{Point, Real};
 use crate::rays::{RaySource, Selection};
 use crate::sky::Views;
 use crate::threads::Query;
 use bvh_search::bvh_core::{Traced, neighbours};
 use bvh_search::prelude::*;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::mem;
 
-/// One number per ray, hit or point.
-pub type Column<'py, T> = Bound<'py, PyArray1<T>>;
-/// One point or direction per ray or point.
-pub type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 /// Numbers in the precision of the tree.
 pub type Reals<'py> = Bound<'py, PyAny>;
-
-type Point<N> = <<N as Real>::Layout as Traced>::Point;
 
 /// The number of rays that a thread traces at once.
 const BATCH: usize = 1024;
@@ -191,7 +186,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
     ) -> PyResult<Bound<'py, PyAny>> {
         let Self { py, progress, layout, .. } = self;
         let view = views.view();
-        let (count, words) = (view.points.len(), views.sky.words());
+        let count = view.points.len();
         let width = views.shape[1..].iter().product::<usize>();
         let answers = Query::ask(py, progress, count.div_ceil(FEW), |query| {
             let mut answers = Vec::new();
@@ -199,7 +194,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
                 |_| format!("points: {count} rows of {width} answers do not fit into memory");
             answers.try_reserve_exact(count.saturating_mul(width)).map_err(fault)?;
             answers.resize(count * width, T::default());
-            let order = neighbours(layout, view.points);
+            let order = neighbours(view.points);
             // Neighbours are answered together, each in its own row.
             let mut rows: Vec<&mut [T]> = answers.chunks_mut(width.max(1)).collect();
             rows.resize_with(count, Default::default);
@@ -207,11 +202,10 @@ impl<'py, N: Real> Call<'_, 'py, N> {
             let mut ordered: Vec<&mut [T]> = ordered.collect();
             let parts = ordered.par_chunks_mut(FEW).zip(order.par_chunks(FEW));
             query.answer(parts, |_, (answers, order)| {
-                let mut free = vec![0; order.len() * words];
-                views.sky.visible(layout, view, order, &mut free);
-                for (number, (&point, answers)) in order.iter().zip(answers).enumerate() {
-                    answer(point as usize, &free[number * words..][..words], answers);
-                }
+                let mut answers = answers.iter_mut();
+                views.sky.visible(layout, view, order, |point, row| {
+                    answers.next().into_iter().for_each(|to| answer(point, row, to));
+                });
                 Ok(())
             })?;
             Ok(answers)

@@ -6,8 +6,13 @@ use crate::elements::{INTEGERS, Kinds, Number, REAL_NUMBERS, invalid};
 use crate::precision::{Precision, Real, with_precision};
 use bvh_search::bvh_core::MAX_OBJECTS;
 use bvh_search::{Objects, prelude::*};
-use numpy::{Element, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{Element, PyArray1, PyArray2, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+
+/// One number per ray, hit or point.
+pub type Column<'py, T> = Bound<'py, PyArray1<T>>;
+/// One point or direction per ray or point.
+pub type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 
 /// A numpy array in row order, aligned and of native byte order. Only [`numbers`] makes one.
 ///

@@ -69,6 +69,9 @@ type How<'a> = (Select<'a>, Coherence);
 /// A layout, and its triangles by their indices.
 type Scene<'a, N> = (&'a <N as Real>::Layout, &'a [<N as Real>::Triangle]);
 
+/// A point of a layout.
+pub type Point<N> = <<N as Real>::Layout as Traced>::Point;
+
 /// A number of coordinates, and how triangles with such corners are traced.
 pub trait Real: Number + Pod + Default {
     type Triangle: Corners + From<[[Self; 3]; 3]> + Pod + Sync;
@@ -89,7 +92,7 @@ pub trait Real: Number + Pod + Default {
 
     fn layout(tree: &OwnedTree) -> Option<Result<Self::Layout, InvalidBvh>>;
 
-    fn point(point: DVec3) -> <Self::Layout as Traced>::Point;
+    fn point(point: DVec3) -> Point<Self>;
 
     /// Makes a ray over a range of distances, or says what is wrong with it.
     fn ray(origin: DVec3, direction: DVec3, limits: [f64; 2]) -> Result<Self::Ray, String>;

@@ -2,13 +2,13 @@
 
 use crate::arrays::{Array, numbers};
 use crate::elements::invalid;
-use crate::precision::{Precision, Real};
+use crate::precision::{Point, Precision, Real};
 use bvh_search::bvh_core::glam::DVec3;
-use bvh_search::bvh_core::{Orientation, Select, Traced};
+use bvh_search::bvh_core::{Orientation, Select};
 use pyo3::prelude::*;
 
 /// Reads points, `(m, 3)`.
-pub fn points<N: Real>(argument: &Bound<PyAny>) -> PyResult<Vec<<N::Layout as Traced>::Point>> {
+pub fn points<N: Real>(argument: &Bound<PyAny>) -> PyResult<Vec<Point<N>>> {
     let points = Vectors::read("points", argument, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
     let slice = points.slice()?;
     Ok((0..points.len()).map(|index| N::point(slice.at(index))).collect())

@@ -1,18 +1,15 @@
 //! Skies: built-in ones as arrays, and points that look at any.
 
-use crate::answers::{Column, Rows};
-use crate::arrays::numbers;
+use crate::arrays::{Column, Rows, numbers};
 use crate::elements::invalid;
-use crate::precision::Real;
+use crate::precision::{Point, Real};
 use crate::rays::vectors;
 use crate::scalars::count;
 use bvh_search::bvh_core::glam::DVec3;
-use bvh_search::bvh_core::{Sky, Traced, View};
+use bvh_search::bvh_core::{Sky, View};
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use std::num::NonZeroU32;
-
-type Point<N> = <<N as Real>::Layout as Traced>::Point;
 
 /// Returns directions of the sky above the plane of x (east) and y (north), unit vectors `(m, 3)`,
 /// and their weights, `(m,)`: the solid angle of each over π. With `cosine=True`,
@@ -104,7 +101,7 @@ impl<N: Real> Views<N> {
     /// Writes the sums of the weights of the free directions in a point's row.
     pub fn sums(&self, point: usize, row: &[u64], sums: &mut [f64]) {
         let normals = self.normals.as_ref().filter(|_| self.cosine);
-        let normal = normals.map(|normals| N::Layout::double(normals[point]));
+        let normal = normals.map(|normals| normals[point].into());
         for (sum, found) in sums.iter_mut().zip(self.sky.sums(row, normal)) {
             *sum = found;
         }

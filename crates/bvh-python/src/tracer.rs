@@ -1,8 +1,9 @@
 //! The class `Tracer`: triangles in the wide layout, which answer batches of rays and points on all
 //! threads.
 
-use crate::answers::{Call, Column, Hint, Reals, Rows};
+use crate::answers::{Call, Hint, Reals};
 use crate::arrays::numbers;
+use crate::arrays::{Column, Rows};
 use crate::elements::invalid;
 use crate::precision::Real;
 use crate::rays::{RayArrays, Selection, points};

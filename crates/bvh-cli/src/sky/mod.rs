@@ -236,19 +236,17 @@ fn seen_from(
     by_cosine: bool,
     done: &(dyn Fn(u64) + Sync),
 ) -> Vec<f64> {
-    /// Points at a time, whose bits are in memory.
+    /// Points of a task.
     const PART: usize = 1024;
-    let order = neighbours(wide, view.points);
+    let order = neighbours(view.points);
     let parts: Vec<Vec<f64>> = order
         .par_chunks(PART)
         .map(|order| {
-            let mut free = vec![0; order.len() * sky.words()];
-            sky.visible(wide, view, order, &mut free);
-            let rows = free.chunks_exact(sky.words()).zip(order);
-            let normal = |point: u32| Some(view.normals?[point as usize].as_dvec3());
-            let sums =
-                rows.flat_map(|(row, &point)| sky.sums(row, normal(point).filter(|_| by_cosine)));
-            let sums = sums.collect();
+            let normals = view.normals.filter(|_| by_cosine);
+            let mut sums = Vec::new();
+            sky.visible(wide, view, order, |point, row| {
+                sums.extend(sky.sums(row, normals.map(|normals| normals[point].as_dvec3())));
+            });
             done(order.len() as u64);
             sums
         })

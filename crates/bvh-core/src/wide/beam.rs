@@ -12,9 +12,9 @@
 //! ```
 //!
 //! The coefficients are computed once for a beam, in f64, and rounded to f32. A ray then takes nine
-//! fused operations instead of thirty. Boxes are tested twice: all children of a node against the
-//! whole beam by interval arithmetic, as in [`packet`](super::packet), then a leaf's box against every
-//! ray, in vectors.
+//! fused operations instead of thirty. Boxes are tested twice: all children of a node against each
+//! vector of rays by interval arithmetic, as in [`packet`](super::packet), then a leaf's box against
+//! every ray of the vectors that may enter it.
 //!
 //! # The bounds
 //!
@@ -36,7 +36,8 @@
 //! *Decisions.* Where S is certainly not 0, one edge value of the other sign is enough: the sum is
 //! S, so that another one has its sign, and the line misses the triangle. The end of the range is
 //! multiplied by S |d_z| and 1 ± 8u, which covers these roundings and that of a distance to f32, but
-//! for one that is subnormal, which is off by 2⁻¹⁵⁰. No relative coordinate is larger than 2, and so ends beyond 16 are as good as 16.
+//! for one that is subnormal, which is off by 2⁻¹⁵⁰. No relative coordinate is larger than 2, and so
+//! ends beyond 16 are as good as 16.
 //!
 //! Rays that are left open are traced by themselves, against that triangle alone.
 //!
@@ -51,6 +52,7 @@ use super::lanes::{Aligned, DoubleLanes, Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
 use super::vector;
+use crate::double::largest_axis;
 use crate::exact::AXES;
 use crate::ray::pow2;
 use crate::slabs::{FAR, NEAR};
@@ -284,12 +286,6 @@ impl<K: Instructions> Group<K> {
             group
         }
     }
-}
-
-#[inline(always)]
-fn largest_axis(direction: DVec3) -> usize {
-    let [x, y, z] = direction.abs().to_array();
-    if z > x.max(y) { 2 } else { usize::from(y > x) }
 }
 
 /// Returns the greatest power of two up to a positive normal number.

@@ -3,6 +3,7 @@
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::triangles::TriangleBlock;
+use crate::double::largest_axis;
 use crate::exact::AXES;
 use crate::exact::{ERROR, NARROWER, Twice, distance};
 use crate::{DRay, DTriangle};
@@ -59,10 +60,7 @@ impl DoubleBlock {
     #[inline(always)]
     pub(super) unsafe fn decide<L: Lanes>(&self, ray: &DRay, possible: u32) -> Decided {
         const { assert!(L::N == TriangleBlock::LANES) };
-        let direction = ray.direction.abs();
-        let is_second = direction.y > direction.x;
-        let is_third = direction.z > direction.x.max(direction.y);
-        let [i, j, k] = AXES[if is_third { 2 } else { usize::from(is_second) }];
+        let [i, j, k] = AXES[largest_axis(ray.direction)];
         // SAFETY: the processor has the instructions; there are so many numbers.
         unsafe {
             let (origin, direction) = (ray.origin, ray.direction);

@@ -2,8 +2,8 @@
 
 use crate::support::{Random, SHAPES, ball, chain, grid_box, junction, soup, tree};
 use bvh_core::{
-    Bvh, DRay, DTriangle, DWideBvh, Frame, InFrame, InvalidSky, Kernel, Ray, Select, Sky, Triangle,
-    View, WideBvh, neighbours,
+    Bvh, DRay, DTriangle, DWideBvh, Frame, InFrame, InvalidSky, Kernel, Ray, Select, Sky, Traced,
+    Triangle, View, WideBvh, neighbours,
 };
 use core::num::NonZeroU32;
 use glam::{DMat3, DQuat, DVec3, Vec3};
@@ -70,9 +70,32 @@ fn any_tree(boxes: &[bvh_core::Aabb], frame: Option<Frame>, random: &mut Random)
     Bvh { frame, ..bvh }
 }
 
-/// Returns whether a row says that a direction is free.
-fn is_free(row: &[u64], direction: usize) -> bool {
-    row[direction / 64] >> (direction % 64) & 1 != 0
+/// Compares what points see with whether the ray of a point, by its number, hits anything along a
+/// direction. Returns how many directions are hidden, and how many are free.
+fn compared<L: Traced>(
+    layout: &L,
+    sky: &Sky,
+    points: &[L::Point],
+    is_hit: impl Fn(usize, DVec3) -> bool,
+) -> [usize; 2] {
+    let mut counts = [0; 2];
+    let mut seen = Vec::new();
+    sky.visible(layout, View { points, normals: None }, &neighbours(points), |point, row| {
+        seen.push(point);
+        for (number, &direction) in sky.directions().iter().enumerate() {
+            let is_free = row[number / 64] >> (number % 64) & 1 != 0;
+            assert_eq!(
+                is_free,
+                !is_hit(point, direction),
+                "{:?}: {direction:?}",
+                points[point].into()
+            );
+            counts[usize::from(is_free)] += 1;
+        }
+    });
+    seen.sort_unstable();
+    assert!(seen.into_iter().eq(0..points.len()));
+    counts
 }
 
 #[test]
@@ -88,8 +111,6 @@ fn a_direction_is_free_where_a_ray_along_it_hits_nothing_on_every_kernel() {
                 triangles.iter().map(|t| t.0.map(Vec3::as_dvec3)).collect();
             let points = points(&corners, 150, &mut random);
             let directions = directions(&corners, &points, &mut random);
-            let directions: Vec<DVec3> =
-                directions.into_iter().map(|d| d.as_vec3().as_dvec3()).collect();
             let points: Vec<Vec3> = points.iter().map(|p| p.as_vec3()).collect();
             let frames = [None, Some(frame(points[0].as_dvec3(), &mut random))];
             for frame in frames {
@@ -99,22 +120,14 @@ fn a_direction_is_free_where_a_ray_along_it_hits_nothing_on_every_kernel() {
                 let t = f64::from(size * random.unit());
                 let range = random.of(&[[0.0, f64::INFINITY], [0.0, t], [t * 0.1, t], [t, 1e38]]);
                 let sky = Sky::new(directions.clone(), range).unwrap();
-                let view = View { points: &points, normals: None };
                 for kernel in Kernel::ALL {
                     let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
-                    let order = neighbours(&wide, &points);
-                    let mut free = vec![0; points.len() * sky.words()];
-                    sky.visible(&wide, view, &order, &mut free);
-                    for (row, &number) in free.chunks_exact(sky.words()).zip(&order) {
-                        for (place, direction) in directions.iter().enumerate() {
-                            let [t_min, t_max] = range.map(|t| t as f32);
-                            let origin = points[number as usize];
-                            let ray = Ray::new(origin, direction.as_vec3(), t_min, t_max).unwrap();
-                            let free = is_free(row, place);
-                            assert_eq!(free, !wide.any_hit(&ray), "{kernel:?} {ray:?}");
-                            counts[usize::from(free)] += 1;
-                        }
-                    }
+                    let [t_min, t_max] = range.map(|t| t as f32);
+                    let found = compared(&wide, &sky, &points, |point, direction| {
+                        let ray = Ray::new(points[point], direction.as_vec3(), t_min, t_max);
+                        wide.any_hit(&ray.unwrap())
+                    });
+                    counts = [counts[0] + found[0], counts[1] + found[1]];
                 }
             }
         }
@@ -146,26 +159,40 @@ fn a_direction_is_free_in_f64_where_a_ray_along_it_hits_nothing_on_every_kernel(
             let t = size * f64::from(random.unit());
             let range = random.of(&[[0.0, f64::INFINITY], [0.0, t], [t * 0.1, t]]);
             let sky = Sky::new(directions.clone(), range).unwrap();
-            let view = View { points: &points, normals: None };
             for kernel in Kernel::ALL {
                 let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
-                let order = neighbours(&wide, &points);
-                let mut free = vec![0; points.len() * sky.words()];
-                sky.visible(&wide, view, &order, &mut free);
-                for (row, &number) in free.chunks_exact(sky.words()).zip(&order) {
-                    for (place, &direction) in directions.iter().enumerate() {
-                        let origin = points[number as usize];
-                        let ray = DRay::new(origin, direction, range[0], range[1]).unwrap();
-                        let free = is_free(row, place);
-                        let is_hit = wide.any_hit(&ray, Select::default());
-                        assert_eq!(free, !is_hit, "{kernel:?} {ray:?}");
-                        counts[usize::from(free)] += 1;
-                    }
-                }
+                let found = compared(&wide, &sky, &points, |point, direction| {
+                    let ray = DRay::new(points[point], direction, range[0], range[1]).unwrap();
+                    wide.any_hit(&ray, Select::default())
+                });
+                counts = [counts[0] + found[0], counts[1] + found[1]];
             }
         }
     }
     assert!(counts[0] > 100_000 && counts[1] > 100_000, "{counts:?}");
+}
+
+#[test]
+fn a_layout_in_f32_looks_along_directions_rounded_to_f32() {
+    let mut random = Random(72);
+    // Small triangles far away, that a rounded direction often misses where the given one hits.
+    let place = Vec3::new(3000.0, 7000.0, 5000.0);
+    let moved = |to: Vec3| move |t: &Triangle| Triangle(t.0.map(|p| p + to));
+    let mut triangles: Vec<Triangle> = soup(50, &mut random).iter().map(moved(place)).collect();
+    // A scene so large that the points are not far from it.
+    triangles.extend(triangles.clone().iter().map(moved(-3.0 * place)));
+    let wide = laid(&triangles);
+    let points: Vec<Vec3> = (0..64).map(|_| random.point()).collect();
+    let mut edge = || {
+        let Triangle([a, b, _]) = random.of(&triangles[..50]);
+        let to = a.as_dvec3().lerp(b.as_dvec3(), random.unit().into());
+        (to - points[random.below(64)].as_dvec3()).normalize()
+    };
+    let directions: Vec<DVec3> = (0..500).map(|_| edge()).collect();
+    let sky = Sky::new(directions, [0.0, f64::INFINITY]).unwrap();
+    compared(&wide, &sky, &points, |point, direction| {
+        wide.any_hit(&Ray::half_line(points[point], direction.as_vec3()).unwrap())
+    });
 }
 
 /// A layout of triangles along the axes of the file.
@@ -184,15 +211,19 @@ fn with_normals_directions_below_the_surface_are_not_free_and_cosines_weigh() {
     let sky = sky.with_weights(vec![1.0, 10.0, 2.0, 20.0, 4.0, 40.0]).unwrap();
     let points = [Vec3::ZERO; 2];
     let normals = [Vec3::Z * 5.0, -Vec3::Z];
-    let mut free = [0; 2];
-    sky.visible(&wide, View { points: &points, normals: Some(&normals) }, &[1, 0], &mut free);
-    assert_eq!(free, [0b010, 0b001]);
-    assert_eq!(sky.sums(&free[..1], None), [2.0, 20.0]);
-    assert_eq!(sky.sums(&free[1..], Some(normals[0].as_dvec3())), [0.8, 8.0]);
-    assert_eq!(sky.sums(&free[1..], Some(DVec3::Z * 1e200)), [0.8, 8.0]);
-    sky.visible(&wide, View { points: &points, normals: None }, &[0, 1], &mut free);
-    assert_eq!(free, [0b111; 2]);
-    assert_eq!(sky.sums(&free[..1], None), [7.0, 70.0]);
+    let seen = |normals, order: &[u32]| {
+        let mut free = Vec::new();
+        sky.visible(&wide, View { points: &points, normals }, order, |point, row| {
+            free.push((point, row[0]));
+        });
+        free
+    };
+    assert_eq!(seen(Some(&normals[..]), &[1, 0]), [(1, 0b010), (0, 0b001)]);
+    assert_eq!(sky.sums(&[0b010], None), [2.0, 20.0]);
+    assert_eq!(sky.sums(&[0b001], Some(normals[0].as_dvec3())), [0.8, 8.0]);
+    assert_eq!(sky.sums(&[0b001], Some(DVec3::Z * 1e200)), [0.8, 8.0]);
+    assert_eq!(seen(None, &[0, 1]), [(0, 0b111), (1, 0b111)]);
+    assert_eq!(sky.sums(&[0b111], None), [7.0, 70.0]);
 }
 
 #[test]
@@ -218,16 +249,14 @@ fn the_view_of_the_sky_from_a_canyon_is_that_of_its_formula() {
     let sky = Sky::new(directions, [0.0, f64::INFINITY]).unwrap();
     let xs = [-0.9, -0.5, 0.0, 0.7f32];
     let points = xs.map(|x| Vec3::new(x, 0.0, 0.0));
-    let order = neighbours(&wide, &points);
-    let mut free = vec![0; points.len() * sky.words()];
-    sky.visible(&wide, View { points: &points, normals: Some(&[Vec3::Z; 4]) }, &order, &mut free);
-    for (row, point) in free.chunks(sky.words()).zip(order) {
-        let x = f64::from(xs[point as usize]);
+    let view = View { points: &points, normals: Some(&[Vec3::Z; 4]) };
+    sky.visible(&wide, view, &neighbours(&points), |point, row| {
+        let x = f64::from(xs[point]);
         let sine = |distance: f64| distance / distance.hypot(1.0);
         let formula = (sine(1.0 - x) + sine(1.0 + x)) / 2.0;
         let seen = sky.sums(row, None)[0] / count;
         assert!((seen - formula).abs() < 0.002, "{x}: {seen} {formula}");
-    }
+    });
 }
 
 #[test]
@@ -252,13 +281,12 @@ fn built_in_skies_cover_the_hemisphere_and_weigh_a_free_view_as_one() {
 
 #[test]
 fn neighbours_are_a_permutation_of_any_points() {
-    let wide = laid(&grid_box(1));
     let mut random = Random(7);
     for count in [0, 1, 15, 16, 17, 63, 64, 65, 1000] {
         for is_one_place in [false, true] {
             let place = |_| if is_one_place { Vec3::ONE } else { random.point() };
             let points: Vec<Vec3> = (0..count).map(place).collect();
-            let mut order = neighbours(&wide, &points);
+            let mut order = neighbours(&points);
             order.sort_unstable();
             assert!(order.into_iter().eq(0..count as u32));
         }
