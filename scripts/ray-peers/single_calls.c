@@ -6,29 +6,7 @@
 #include <time.h>
 
 #include "bvh_search.h"
-
-/* The part of Embree 4's interface that is used here, so that only its library is needed, not its headers. */
-typedef struct __attribute__((aligned(16))) {
-    float origin[3], t_min, direction[3], time, t_max;
-    unsigned mask, id, flags;
-} RTCRay;
-typedef struct __attribute__((aligned(16))) {
-    float normal[3], u, v;
-    unsigned triangle, geometry, instance[2];
-} RTCHit;
-typedef struct { RTCRay ray; RTCHit hit; } RTCRayHit;
-void *rtcNewDevice(const char *config);
-void *rtcNewScene(void *device);
-void rtcSetSceneFlags(void *scene, int flags);
-void rtcSetSceneBuildQuality(void *scene, int quality);
-void *rtcNewGeometry(void *device, int type);
-void *rtcSetNewGeometryBuffer(void *geometry, int type, unsigned slot, int format, size_t stride, size_t count);
-void rtcCommitGeometry(void *geometry);
-unsigned rtcAttachGeometry(void *scene, void *geometry);
-void rtcCommitScene(void *scene);
-void rtcIntersect1(void *scene, RTCRayHit *ray, void *arguments);
-void rtcOccluded1(void *scene, RTCRay *ray, void *arguments);
-enum { TRIANGLE = 0, INDEX = 0, VERTEX = 1, UINT3 = 0x5003, FLOAT3 = 0x9003, HIGH_QUALITY = 2, ROBUST = 4 };
+#include "embree.h"
 
 enum { SIDE = 256, TRIANGLES = 2 * SIDE * SIDE, RAYS = 1 << 16, ROUNDS = 15 };
 
@@ -139,15 +117,7 @@ int main(void) {
     void *device = rtcNewDevice("threads=1,set_affinity=0");
     embree = rtcNewScene(device);
     rtcSetSceneFlags(embree, ROBUST);
-    rtcSetSceneBuildQuality(embree, HIGH_QUALITY);
-    void *mesh = rtcNewGeometry(device, TRIANGLE);
-    float *vertices = rtcSetNewGeometryBuffer(mesh, VERTEX, 0, FLOAT3, 12, 3 * TRIANGLES);
-    unsigned *indices = rtcSetNewGeometryBuffer(mesh, INDEX, 0, UINT3, 12, TRIANGLES);
-    for (unsigned i = 0; i < 9 * TRIANGLES; i++) vertices[i] = (&corners[0][0][0])[i];
-    for (unsigned i = 0; i < 3 * TRIANGLES; i++) indices[i] = i;
-    rtcCommitGeometry(mesh);
-    rtcAttachGeometry(embree, mesh);
-    rtcCommitScene(embree);
+    embree_build(device, embree, &corners[0][0][0], TRIANGLES);
 #ifdef MORE
     more_new(&corners[0][0][0], TRIANGLES);
 #endif

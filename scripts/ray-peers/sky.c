@@ -6,30 +6,7 @@
 #include <time.h>
 
 #include "bvh_search.h"
-
-/* The part of Embree 4's interface that is used here, so that only its library is needed, not its headers. */
-typedef struct __attribute__((aligned(16))) {
-    float origin[3], t_min, direction[3], time, t_max;
-    unsigned mask, id, flags;
-} RTCRay;
-typedef struct {
-    int flags, features;
-    void *context, *filter, *occluded;
-    float width;
-} RTCOccludedArguments;
-void *rtcNewDevice(const char *config);
-void *rtcNewScene(void *device);
-void rtcSetSceneBuildQuality(void *scene, int quality);
-void *rtcNewGeometry(void *device, int type);
-void *rtcSetNewGeometryBuffer(void *geometry, int type, unsigned slot, int format, size_t stride, size_t count);
-void rtcCommitGeometry(void *geometry);
-unsigned rtcAttachGeometry(void *scene, void *geometry);
-void rtcCommitScene(void *scene);
-void rtcReleaseScene(void *scene);
-void rtcOccluded1(void *scene, RTCRay *ray, void *arguments);
-void rtcOccluded8(const int *valid, void *scene, void *rays, void *arguments);
-void rtcOccluded16(const int *valid, void *scene, void *rays, void *arguments);
-enum { TRIANGLE = 0, INDEX = 0, VERTEX = 1, UINT3 = 0x5003, FLOAT3 = 0x9003, HIGH_QUALITY = 2, COHERENT = 1 << 16 };
+#include "embree.h"
 
 enum { DIRECTIONS = 145, ROUNDS = 5, GROUP = 16 };
 
@@ -125,11 +102,13 @@ static void scatter(size_t count) {
     memcpy(sorted, points, count * sizeof *sorted);
 }
 
-static int axis;
-static int by_axis(const void *a, const void *b) {
-    float x = ((const float *)a)[axis], y = ((const float *)b)[axis];
+static int by_size(const void *a, const void *b) {
+    float x = *(const float *)a, y = *(const float *)b;
     return (x > y) - (x < y);
 }
+
+static int axis;
+static int by_axis(const void *a, const void *b) { return by_size((const float *)a + axis, (const float *)b + axis); }
 
 /* Halves points along their longest extent, as ours are, so that packets of neighbours follow each other. */
 static void sort(float (*from)[3], size_t count) {
@@ -242,19 +221,12 @@ static double seconds(void) {
     return (double)time.tv_sec + (double)time.tv_nsec * 1e-9;
 }
 
-static int by_size(const void *a, const void *b) { return by_axis(a, b); }
-
 static void measure(const char *scene, void *device) {
     BvsTree *tree = bvs_tree_from_triangles(triangles[0][0], triangle_count, 5, 1);
     tracer = tree ? bvs_tracer_new(tree) : NULL;
     if (!tracer) puts(bvs_last_error()), exit(EXIT_FAILURE);
     embree = rtcNewScene(device);
-    rtcSetSceneBuildQuality(embree, HIGH_QUALITY);
-    void *mesh = rtcNewGeometry(device, TRIANGLE);
-    memcpy(rtcSetNewGeometryBuffer(mesh, VERTEX, 0, FLOAT3, 12, 3 * triangle_count), triangles, triangle_count * sizeof *triangles);
-    unsigned *indices = rtcSetNewGeometryBuffer(mesh, INDEX, 0, UINT3, 12, triangle_count);
-    for (unsigned i = 0; i < 3 * triangle_count; i++) indices[i] = i;
-    rtcCommitGeometry(mesh), rtcAttachGeometry(embree, mesh), rtcCommitScene(embree);
+    embree_build(device, embree, triangles[0][0], triangle_count);
     static const size_t COUNTS[] = {30000, 300000};
     for (int k = 0; k < 2; k++) {
         scatter(COUNTS[k]);
@@ -273,7 +245,6 @@ static void measure(const char *scene, void *device) {
                     exit(EXIT_FAILURE);
                 }
             }
-        axis = 0;
         for (int i = 0; i < COUNT; i++) {
             qsort(speeds[i], ROUNDS, sizeof speeds[i][0], by_size);
             printf("%s,%zu,%zu,%d,%s,\"%s\",%.2f,%.2f,%.2f,%.4f\n", scene, triangle_count, point_count, DIRECTIONS, WAYS[i].library,
