@@ -16,9 +16,9 @@ pub struct Table<T> {
 }
 
 impl<T: FromStr> Table<T> {
-    /// Reads lines of as many numbers each, separated by commas, semicolons or blanks. The first line may be a header,
-    /// which has no number, and lines may be blank. Faults name the line, and what is `accepted`
-    /// instead.
+    /// Reads lines of as many numbers each, separated by commas, semicolons or blanks. The first
+    /// line may be a header, which has no number, and lines may be blank. Faults name the line, and
+    /// what is `accepted` instead.
     pub fn read(
         bytes: &[u8],
         is_accepted: impl Fn(usize) -> bool,
