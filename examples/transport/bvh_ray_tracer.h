@@ -71,16 +71,29 @@ public:
   }
 
   // The nearest face that counts, and its surface. Adds the face to those that are excluded.
+  //
+  // A hit point is rounded, perhaps across the next face, too, and a particle that starts there may
+  // never leave its volume. So a particle that flies on from the last hit point of this thread keeps
+  // its origin, and the next face is the first one at that distance or beyond:
+  //
+  //     origin ──────────── t ───── next face        the ray, in real arithmetic
+  //                          ·                       the caller's rounded point
   std::pair<double, MeshID> ray_fire(TreeID tree, const Position& origin, const Direction& direction,
                                      const double dist_limit = INFTY,
                                      HitOrientation orientation = HitOrientation::EXITING,
                                      std::vector<MeshID>* const exclude_primitives = nullptr) override {
     const Tree& faces = trees_.at(tree);
-    BvsHitF64 hit = nearest(faces, origin, direction, dist_limit, orientation, exclude_primitives);
+    thread_local Flight flight;
+    if (!exclude_primitives || exclude_primitives->empty() || !flight.goes_on(origin, direction))
+      flight = {origin, direction, 0};
+    const double end = flight.t + dist_limit;
+    BvsHitF64 hit = nearest(faces, flight.origin, direction, end, orientation, exclude_primitives, flight.t);
     if (hit.object == UINT32_MAX) return {INFTY, ID_NONE};
+    const double distance = hit.t - flight.t;
+    flight.t = hit.t;
     const Label& label = faces.labels[hit.object];
     if (exclude_primitives) exclude_primitives->push_back(label.face);
-    return {hit.t, label.surface};
+    return {distance, label.surface};
   }
 
   // A point is inside if the half line from it leaves the volume before it enters it. Where it does
@@ -118,6 +131,25 @@ public:
   }
 
 private:
+  struct Flight {
+    Position origin;
+    Direction direction;
+    // The distance of the last hit.
+    double t;
+
+    // Whether a point is the last hit point, but for rounding, and the direction the same.
+    bool goes_on(const Position& point, const Direction& along) const {
+      double off = 0, size = 0;
+      for (int axis = 0; axis < 3; axis++) {
+        if (along[axis] != direction[axis]) return false;
+        const double hit = origin[axis] + t * direction[axis];
+        off = std::max(off, std::fabs(point[axis] - hit));
+        size = std::max({size, std::fabs(hit), std::fabs(origin[axis])});
+      }
+      return off <= 0x1p-46 * size;
+    }
+  };
+
   struct Face {
     MeshID face;
     MeshID surface;
@@ -181,8 +213,8 @@ private:
   }
 
   static BvsHitF64 nearest(const Tree& tree, const Position& origin, const Direction& direction, double limit,
-                           HitOrientation orientation, const std::vector<MeshID>* excluded) {
-    BvsRayF64 ray{{origin.x, origin.y, origin.z}, 0, {direction.x, direction.y, direction.z}, limit};
+                           HitOrientation orientation, const std::vector<MeshID>* excluded, double t_min = 0) {
+    BvsRayF64 ray{{origin.x, origin.y, origin.z}, t_min, {direction.x, direction.y, direction.z}, limit};
     // xdg counts from -1: either, exiting, entering.
     BvsSelect select{uint32_t(orientation + 1), 0, nullptr};
     thread_local std::vector<uint32_t> ids;

@@ -1,6 +1,7 @@
 // Nested solids with shared faces, and particles that fly through them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -143,7 +144,8 @@ struct Flight {
 };
 
 // Particles fly straight from face to face, from each hit point without the faces there, and one step
-// in four ends before the face, in another direction.
+// in four ends before the face, in another direction. One direction in three is that of an edge of the
+// box, and of these every second that of a corner: rounding carries hit points across two faces there.
 inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, long steps, uint64_t seed, int look) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -151,14 +153,24 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
   auto is_in = [&](MeshID volume, const Position& point) {
     return tracer.point_in_volume(trees.of_volume.at(volume), point, nullptr, nullptr);
   };
-  auto direction = [&] {
-    double x = normal(random), y = normal(random), z = normal(random), length = std::sqrt(x * x + y * y + z * z);
+  auto direction = [&](const Position& from) {
+    double x = normal(random), y = normal(random), z = normal(random);
+    if (random() % 3 == 0) {
+      std::array<double, 3> to;
+      for (double& at : to) at = random() % 2 ? 1 : -1;
+      if (random() % 2) to[random() % 3] = 2 * unit(random) - 1;
+      Position edge = mesh.place(to[0], to[1], to[2]);
+      // A particle may be there.
+      if (std::max({std::fabs(edge.x - from.x), std::fabs(edge.y - from.y), std::fabs(edge.z - from.z)}) > 1e-6)
+        x = edge.x - from.x, y = edge.y - from.y, z = edge.z - from.z;
+    }
+    double length = std::sqrt(x * x + y * y + z * z);
     return Direction{x / length, y / length, z / length};
   };
   Flight flight;
   while (flight.steps < steps) {
     Position point = mesh.place(unit(random) * 8 - 4, unit(random) * 8 - 4, unit(random) * 8 - 4);
-    Direction along = direction();
+    Direction along = direction(point);
     MeshID volume = Solids::LEFT;
     while (volume < Solids::OUTSIDE && !is_in(volume, point)) volume++;
     std::vector<MeshID> passed;
@@ -169,7 +181,9 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
         flight.lost++;
         break;
       }
-      if (flight.steps % look == 0) {
+      // Between the faces of an edge there is no place.
+      const bool is_between = t > 1e-6;
+      if (is_between && flight.steps % look == 0) {
         flight.looked_at++;
         for (MeshID other = Solids::LEFT; other < Solids::OUTSIDE; other++)
           if (is_in(other, at(point, along, t / 2)) != (other == volume)) {
@@ -177,9 +191,9 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
             break;
           }
       }
-      if (random() % 4 == 0) {
-        point = at(point, along, t * unit(random));
-        along = direction();
+      if (is_between && random() % 4 == 0) {
+        point = at(point, along, t * (0.01 + 0.98 * unit(random)));
+        along = direction(point);
         passed.clear();
         continue;
       }
