@@ -232,7 +232,9 @@ impl Traced for WideBvh {
 
     fn as_of_rays(directions: &[DVec3], range: [f64; 2]) -> (Vec<DVec3>, [f64; 2]) {
         let directions = directions.iter().map(|direction| direction.as_vec3().into()).collect();
-        (directions, range.map(|t| f64::from(t as f32)))
+        // A ray ends at the greatest number at the latest, and a distance beyond it is no hit.
+        let [begin, end] = range.map(|t| f64::from(t as f32));
+        (directions, [begin, end.min(f64::from(f32::MAX))])
     }
 
     fn look(

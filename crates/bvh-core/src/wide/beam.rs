@@ -11,40 +11,46 @@
 //!  A─────B         and S t d_z = S z_A + v(p) (z_B − z_A) + w(p) (z_C − z_A) − S p.z
 //! ```
 //!
-//! The coefficients are computed once for a beam, in f64, and rounded to f32. A ray then takes nine
-//! fused operations instead of thirty. Boxes are tested twice: all children of a node against each
-//! vector of rays by interval arithmetic, as in [`packet`](super::packet), then a leaf's box against
-//! every ray of the vectors that may enter it.
+//! The coefficients are computed once for a beam, in f64, and rounded to f32. A ray then takes eight
+//! fused operations, a product and a difference, instead of thirty. Boxes are tested twice: all
+//! children of a node against each vector of rays by interval arithmetic, as in
+//! [`packet`](super::packet), then a leaf's box against every ray of the vectors that may enter it.
+//! Only the vectors that may enter a child go on to its children.
 //!
 //! # The bounds
 //!
-//! Coordinates are scaled by a power of two, so that relative ones are at most 2. With u = 2⁻²⁴ and
-//! ε = 2⁻⁵³, let m be the largest |x|, |y| of the sheared corners, H_x and H_y the extents of the
-//! sheared points and H_z that of the points along z, and n = m + H_x + H_y.
+//! Coordinates are scaled by a power of two, so that relative ones are at most 1. With u = 2⁻²⁴ and
+//! ε = 2⁻⁵³, let m be the largest |x|, |y| of the sheared corners, H_x and H_y half the extents of the
+//! sheared points and H_z half that of the points along z, and n = m + H_x + H_y.
 //!
 //! *Corners.* A relative coordinate is off by 2ε, its product with the slope by 4ε, and the sheared
-//! coordinate, which is at most 4, by η = 20ε. The difference of two of them is off by 2.5η, B × C by
+//! coordinate, which is at most 2, by η = 20ε. The difference of two of them is off by 2.5η, B × C by
 //! less than 5ηm, and u(p) by less than 10ηn: below 2⁻⁴⁵n. S is off by less than 20ηm. z_B − z_A is at
-//! most 4, and so the constant term of the last equation is off by less than 80ηm, its coefficients
-//! by 12ηn, and S p.z by 40ηm: below 2⁻⁴⁰n together.
+//! most 2, and so the constant term of the last equation is off by less than 80ηm, its coefficients
+//! by 12ηn, S p.z by 40ηm, and S times an end, which matters up to 4, by 80ηm: below 2⁻⁴⁰n together.
+//! Products of two errors are left out. They, and what f32 loses below its normal numbers, count
+//! only where n is below 2⁻⁴⁵; there no value exceeds the bound 2⁻⁴⁴n, and nothing is certain.
 //!
 //! *Points.* A relative coordinate is rounded to f32, off by u, the slope too, and so the sheared
-//! ones are off by 3u of H_x and H_y. The coefficients are rounded, and two fused operations, or four:
-//! less than 8u of |B × C| + |B.y − C.y| H_x + |C.x − B.x| H_y. In the last equation they are less than
-//! 12u of the sum of its terms' sizes. Twice that is what the code has.
+//! ones are off by at most 4u of H_x and H_y. The coefficients are rounded, and two fused operations,
+//! or four, or twice as many without fused ones: less than 9u of
+//! |B × C| + |B.y − C.y| H_x + |C.x − B.x| H_y. In the last equation they are less than 12u of the sum
+//! of its terms' sizes. The code has 16u for both.
 //!
 //! *Decisions.* Where S is certainly not 0, one edge value of the other sign is enough: the sum is
 //! S, so that another one has its sign, and the line misses the triangle. The end of the range is
 //! multiplied by S |d_z| and 1 ± 8u, which covers these roundings and that of a distance to f32, but
-//! for one that is subnormal, which is off by 2⁻¹⁵⁰. No relative coordinate is larger than 2, and so
-//! ends beyond 16 are as good as 16.
+//! for one that is subnormal, which is off by 2⁻¹⁵⁰. No relative coordinate is larger than 1, and so
+//! ends beyond 16 are as good as 16. Where S may have another sign than the one computed, a hit is
+//! never certain, and a miss by its distance is, since the error of S is in the bound.
 //!
 //! Rays that are left open are traced by themselves, against that triangle alone.
 //!
 //! # Far apart
 //!
-//! Where the points of a beam are so far apart that it meets many triangles that no ray does, rays
-//! one by one take less work. The first beams tell.
+//! Where the points of a beam are far apart, many vectors may enter boxes that none of their rays
+//! enter. There every ray is tested against the boxes of inner nodes, too, and farther apart rays one
+//! by one take less work. The first beams tell both.
 
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{Kernel, SPARE, STACK, deep_stacks};
@@ -69,7 +75,7 @@ const VECTORS: usize = POINTS / 4;
 /// The triangles that stop beams, in f32 or f64, laid out.
 pub(crate) trait Obstacles {
     /// A point.
-    type Point: Copy;
+    type Point: Copy + Into<DVec3>;
     /// A ray.
     type Ray;
 
@@ -157,7 +163,8 @@ impl<O: Obstacles> Beams<'_, O> {
     /// Returns whether a direction is above the surface at a point.
     #[inline(always)]
     fn is_above(&self, point: usize, direction: DVec3) -> bool {
-        self.normals.is_none_or(|normals| O::point(normals[point]).dot(direction) > 0.0)
+        // A tiny normal counts, too.
+        self.normals.is_none_or(|normals| normals[point].into().dot(direction) > 0.0)
     }
 }
 
@@ -172,11 +179,16 @@ fn spread(count: usize) -> Vec<u32> {
         a == 1
     };
     let step = (count * 5 / 13..count).find(is_coprime).unwrap_or(1);
+    let [count, step] = [count as u64, step as u64];
     (0..count).map(|number| (number * step % count) as u32).collect()
 }
 
-/// The number of beams after which it is known whether single rays would take less work.
+/// The number of beams that tell how the others of the same points are traced.
 const TRIALS: usize = 4;
+
+/// The fraction of the children of inner nodes that no ray enters, of those that vectors may enter,
+/// from which on testing every ray pays.
+const LEAST_PRUNED: f32 = 0.3;
 
 /// The work for each ray, about in cycles, from which on points are so far apart that their rays are
 /// traced one by one.
@@ -209,6 +221,7 @@ impl<K: Instructions, O: Obstacles> Task<K> for Trace<'_, O> {
             let base =
                 deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
             let mut work = 0;
+            let [mut tested, mut pruned] = [0; 2];
             for (place, &number) in numbers.iter().enumerate() {
                 let most = MOST_WORK * (TRIALS * origins.len()) as u64;
                 if place == TRIALS && work > most {
@@ -216,10 +229,15 @@ impl<K: Instructions, O: Obstacles> Task<K> for Trace<'_, O> {
                 }
                 let direction = beams.directions[number as usize];
                 let mut beam = Beam::new(&group, beams, direction);
+                beam.is_strict = place < TRIALS || pruned as f32 > LEAST_PRUNED * tested as f32;
                 if let Some(root) = wide.root {
                     beam.traverse(root, base);
                 }
                 work += beam.work;
+                if place < TRIALS {
+                    tested += beam.tested;
+                    pruned += beam.pruned;
+                }
                 free(number as usize, beam.free());
             }
             numbers.len()
@@ -317,6 +335,11 @@ struct Beam<'a, K: Instructions, O: Obstacles> {
     live: [u32; VECTORS],
     /// What was done, about in cycles.
     work: u64,
+    /// Whether every ray is tested against the boxes of inner nodes, how many of those were, and
+    /// how many no ray enters.
+    is_strict: bool,
+    tested: u32,
+    pruned: u32,
 }
 
 impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
@@ -357,6 +380,9 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
                 factors: [[none; 2]; 3],
                 live: [0; VECTORS],
                 work: 0,
+                is_strict: true,
+                tested: 0,
+                pruned: 0,
             };
             for (axis, factors) in beam.factors.iter_mut().enumerate() {
                 let near = K::Rays::splat(inverse[axis] * NEAR);
@@ -402,81 +428,98 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
             let intervals = Intervals::<K>::new(&self.boxed, &self.group.bounds, self.group.count);
             let mut top = base;
             let mut child = root;
+            let mut vectors = u32::MAX >> (32 - self.group.count);
             if !child.is_node() {
                 self.visit_leaf(child.index(), &self.live.clone());
                 return;
             }
             loop {
                 let node = &*wide.nodes.as_ptr().add(child.index());
-                let (masks, mask) = self.enter_children(node, &intervals);
-                self.work += 20 + 12 * self.group.count as u64;
+                let (entering, mut inner) = self.enter_children(node, vectors, &intervals);
                 let is_leaf = K::Boxes::load(node.children.as_ptr().cast()).signs();
-                let mut leaves = mask & is_leaf;
-                let inner = mask & !is_leaf;
+                let mut leaves = inner & is_leaf;
+                inner &= !is_leaf;
                 while leaves != 0 {
                     let lane = leaves.trailing_zeros() as usize & 7;
                     leaves &= leaves - 1;
-                    let (entered, is_entered) = self.enter(node, lane, &intervals, &masks);
-                    self.work += 20 * self.group.count as u64;
+                    let entering = entering.of(lane);
+                    let (rays, entered) = self.enter(node, lane, &intervals, entering);
                     let leaf = node.children.get_unchecked(lane).index();
-                    if is_entered && self.visit_leaf(leaf, &entered) {
+                    if entered != 0 && self.visit_leaf(leaf, &rays) {
                         return;
                     }
                 }
-                if inner != 0 {
-                    K::compress(node, inner, top);
-                    top = top.add(inner.count_ones() as usize);
+                while inner != 0 {
+                    let lane = inner.trailing_zeros() as usize & 7;
+                    inner &= inner - 1;
+                    let mut entered = entering.of(lane);
+                    if self.is_strict {
+                        (_, entered) = self.enter(node, lane, &intervals, entered);
+                        self.tested += 1;
+                        self.pruned += u32::from(entered == 0);
+                    }
+                    if entered != 0 {
+                        let child = node.children.get_unchecked(lane).bits();
+                        *top = u64::from(child) | u64::from(entered) << 32;
+                        top = top.add(1);
+                    }
                 }
                 if top == base {
                     return;
                 }
                 top = top.sub(1);
                 child = Child::from_bits(*top as u32);
+                vectors = (*top >> 32) as u32;
             }
         }
     }
 
-    /// Returns for each vector a bit for each child of a node that some live ray of it may enter, and
-    /// a bit for each that any may.
+    /// Returns which of some vectors have live rays that may enter the children of a node, and a bit
+    /// for each child that any may enter.
     #[inline(always)]
     unsafe fn enter_children(
-        &self,
+        &mut self,
         node: &WideNode,
+        mut vectors: u32,
         intervals: &Intervals<K>,
-    ) -> ([u32; VECTORS], u32) {
-        let mut masks = [0; VECTORS];
+    ) -> (Entering, u32) {
+        let mut entering = Entering([0; 2]);
         let mut any = 0;
+        self.work += 20 + 12 * u64::from(vectors.count_ones());
         // SAFETY: the processor has the instructions.
         unsafe {
-            for (vector, mask) in masks.iter_mut().enumerate().take(self.group.count) {
+            while vectors != 0 {
+                let vector = vectors.trailing_zeros() as usize % VECTORS;
+                vectors &= vectors - 1;
                 if self.live[vector] != 0 {
-                    *mask = intervals.enter(node, vector);
-                    any |= *mask;
+                    let mask = intervals.enter(node, vector);
+                    entering.0[vector / 8] |= u64::from(mask) << (8 * (vector % 8));
+                    any |= mask;
                 }
             }
         }
-        (masks, any)
+        (entering, any)
     }
 
-    /// Returns a bit for each live ray that enters the box of a node's child, and whether there are
-    /// any. Only vectors whose mask has a bit for the child are tested.
+    /// Returns a bit for each live ray of some vectors that enters the box of a node's child, and
+    /// whether there are any.
     #[inline(always)]
     unsafe fn enter(
-        &self,
+        &mut self,
         node: &WideNode,
         lane: usize,
         intervals: &Intervals<K>,
-        masks: &[u32; VECTORS],
-    ) -> ([u32; VECTORS], bool) {
-        let mut entered = [0; VECTORS];
-        let mut any = 0;
+        mut vectors: u32,
+    ) -> ([u32; VECTORS], u32) {
+        let mut rays = [0; VECTORS];
+        let mut entered = 0;
+        self.work += 20 * u64::from(vectors.count_ones());
         // SAFETY: the processor has the instructions; there are six planes of eight lanes.
         unsafe {
             let lanes = node.planes.as_ptr().cast::<f32>().add(lane);
-            for (vector, entered) in entered.iter_mut().enumerate().take(self.group.count) {
-                if masks[vector] >> lane & 1 == 0 {
-                    continue;
-                }
+            while vectors != 0 {
+                let vector = vectors.trailing_zeros() as usize % VECTORS;
+                vectors &= vectors - 1;
                 let mut entry = K::Rays::splat(self.boxed.t_min());
                 let mut exit = K::Rays::splat(self.boxed.t_max());
                 for axis in 0..3 {
@@ -488,11 +531,11 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
                     // `min` returns the second of a NaN and a number.
                     exit = ((far - origin) * far_factor).min(exit);
                 }
-                *entered = entry.le(exit).bits() & self.live[vector];
-                any |= *entered;
+                rays[vector] = entry.le(exit).bits() & self.live[vector];
+                entered |= u32::from(rays[vector] != 0) << vector;
             }
         }
-        (entered, any != 0)
+        (rays, entered)
     }
 
     /// Tests the triangles of a leaf with the rays that enter it. Returns whether all rays are
@@ -581,6 +624,22 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
             let stopped = possible & certain;
             (stopped, possible & !stopped & !beyond.bits())
         }
+    }
+}
+
+/// A byte for each vector with a bit for each child of a node that its rays may enter.
+struct Entering([u64; 2]);
+
+impl Entering {
+    /// Returns a bit for each vector whose rays may enter a child.
+    #[inline(always)]
+    fn of(&self, child: usize) -> u32 {
+        // Moves the lowest bit of byte i to bit 56 + i.
+        let gather = |bytes: u64| {
+            let lowest = (bytes >> child) & 0x0101_0101_0101_0101;
+            (lowest.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
+        };
+        gather(self.0[0]) | gather(self.0[1]) << 8
     }
 }
 

@@ -195,6 +195,30 @@ fn a_layout_in_f32_looks_along_directions_rounded_to_f32() {
     });
 }
 
+#[test]
+fn a_triangle_farther_away_than_any_number_stops_nothing() {
+    let z = 2.0f32.powi(29);
+    let wide = laid(&[Triangle::from([[-z, -z, z], [z, -z, z], [0.0, z, z]])]);
+    let directions = vec![DVec3::Z * 2.0f64.powi(-100), DVec3::Z];
+    let sky = Sky::new(directions, [0.0, f64::INFINITY]).unwrap();
+    let counts = compared(&wide, &sky, &[Vec3::ZERO; 8], |_, direction| {
+        wide.any_hit(&Ray::half_line(Vec3::ZERO, direction.as_vec3()).unwrap())
+    });
+    assert_eq!(counts, [8, 8]);
+}
+
+#[test]
+fn a_normal_of_any_length_counts_in_f64() {
+    let triangles = [DTriangle([DVec3::X, DVec3::Y, DVec3::ONE].map(|p| p + DVec3::splat(9.0)))];
+    let frame = DWideBvh::centred(&triangles);
+    let tree = tree(&DWideBvh::boxes(&triangles, &frame), SHAPES[1], &mut Random(1));
+    let wide = DWideBvh::new(&Bvh { frame: Some(frame), ..tree }, &triangles).unwrap();
+    let sky = Sky::new(vec![DVec3::Z], [0.0, f64::INFINITY]).unwrap();
+    let view =
+        View { points: &[DVec3::ZERO; 2], normals: Some(&[1e-46, -1e-46].map(|z| DVec3::Z * z)) };
+    sky.visible(&wide, view, &[0, 1], |point, row| assert_eq!(row, [[1], [0]][point]));
+}
+
 /// A layout of triangles along the axes of the file.
 fn laid(triangles: &[Triangle]) -> WideBvh {
     let boxes = bvh_core::boxes(triangles);
@@ -227,35 +251,54 @@ fn with_normals_directions_below_the_surface_are_not_free_and_cosines_weigh() {
 }
 
 #[test]
-fn the_view_of_the_sky_from_a_canyon_is_that_of_its_formula() {
-    // Two long walls of height 1 at a distance of 2; the middle of the street sees the angles
-    // between their upper edges.
+fn the_view_of_the_sky_from_a_street_and_before_a_wall_is_that_of_its_formula() {
+    // Long walls of height 1: one, or two at a distance of 2. A point on the ground sees the angle
+    // from the upper edge of one wall to that of the other, or to the horizon.
     let length = 1e4;
     let wall = |x: f32| {
         let [a, b] = [-length, length];
         [[[x, a, 0.0], [x, b, 0.0], [x, b, 1.0]], [[x, a, 0.0], [x, b, 1.0], [x, a, 1.0]]]
     };
-    let walls: Vec<Triangle> = [-1.0, 1.0].into_iter().flat_map(wall).map(Triangle::from).collect();
-    let wide = laid(&walls);
-    // Directions of equal weight by the cosine law: points of the unit disk, lifted.
-    let side = 400;
-    let grid = (0..side * side)
-        .map(|i| [i / side, i % side].map(|k| 2.0 * (k as f64 + 0.5) / side as f64 - 1.0));
-    let directions: Vec<DVec3> = grid
-        .filter(|[x, y]| x * x + y * y < 1.0)
-        .map(|[x, y]| DVec3::new(x, y, (1.0 - x * x - y * y).sqrt()))
-        .collect();
-    let count = directions.len() as f64;
-    let sky = Sky::new(directions, [0.0, f64::INFINITY]).unwrap();
-    let xs = [-0.9, -0.5, 0.0, 0.7f32];
-    let points = xs.map(|x| Vec3::new(x, 0.0, 0.0));
-    let view = View { points: &points, normals: Some(&[Vec3::Z; 4]) };
-    sky.visible(&wide, view, &neighbours(&points), |point, row| {
-        let x = f64::from(xs[point]);
-        let sine = |distance: f64| distance / distance.hypot(1.0);
-        let formula = (sine(1.0 - x) + sine(1.0 + x)) / 2.0;
-        let seen = sky.sums(row, None)[0] / count;
-        assert!((seen - formula).abs() < 0.002, "{x}: {seen} {formula}");
+    for (places, far) in [(&[-1.0, 1.0][..], 1.0), (&[-1.0], f64::INFINITY)] {
+        let walls: Vec<Triangle> =
+            places.iter().copied().flat_map(wall).map(Triangle::from).collect();
+        let xs = [-0.9, -0.5, 0.0, 0.7f32];
+        let points = xs.map(|x| Vec3::new(x, 0.0, 0.0));
+        let view = View { points: &points, normals: Some(&[Vec3::Z; 4]) };
+        let sky = Sky::uniform(100_000);
+        sky.visible(&laid(&walls), view, &neighbours(&points), |point, row| {
+            let x = f64::from(xs[point]);
+            // Of the angle that an edge of this distance has with the vertical.
+            let sine = |distance: f64| distance.min(1e9) / distance.min(1e9).hypot(1.0);
+            let formula = (sine(far - x) + sine(1.0 + x)) / 2.0;
+            let seen = sky.sums(row, Some(DVec3::Z))[0];
+            assert!((seen - formula).abs() < 0.002, "{far} {x}: {seen} {formula}");
+        });
+    }
+}
+
+#[test]
+fn every_point_of_a_hemispherical_hole_sees_half_of_the_sky() {
+    // A sphere sends the same share of light from each of its points to equal areas of it.
+    let at = |turn: usize, up: usize| {
+        let (sin, cos) = (std::f64::consts::FRAC_PI_2 / 40.0 * turn as f64).sin_cos();
+        let (height, width) = (std::f64::consts::FRAC_PI_2 / 40.0 * up as f64).sin_cos();
+        DVec3::new(width * cos, width * sin, -height)
+    };
+    let quads = (0..160).flat_map(|turn| (0..40).map(move |up| (turn, up)));
+    let faces = quads.flat_map(|(turn, up)| {
+        let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| at(turn + i, up + j));
+        [[a, b, c], [a, c, d]]
+    });
+    let faces: Vec<[Vec3; 3]> = faces.map(|face| face.map(|p| p.as_vec3())).collect();
+    let points: Vec<Vec3> = faces.iter().step_by(97).map(|&[a, b, c]| (a + b + c) / 3.0).collect();
+    let inwards: Vec<Vec3> = points.iter().map(|&point| -point).collect();
+    let hole: Vec<Triangle> = faces.into_iter().map(Triangle).collect();
+    let sky = Sky::uniform(20_000).with_range([1e-3, f64::INFINITY]).unwrap();
+    let view = View { points: &points, normals: Some(&inwards) };
+    sky.visible(&laid(&hole), view, &neighbours(&points), |point, row| {
+        let seen = sky.sums(row, Some(inwards[point].as_dvec3()))[0];
+        assert!((seen - 0.5).abs() < 0.01, "{}: {seen}", points[point]);
     });
 }
 
