@@ -48,7 +48,7 @@ export function triangles(geometry) {
     for (let corner = 0; corner < 3 * count; corner++) {
         const place = 3 * first + corner;
         const vertex = index ? index.getX(place) : place;
-        if (vertex >= position.count) {
+        if (!(vertex >= 0 && vertex < position.count)) {
             const accepted = `0 to ${position.count - 1}, the vertices of position`;
             throw new RangeError(`index[${place}] is ${vertex}; accepted: ${accepted}`);
         }

@@ -2,7 +2,7 @@ import type { BufferGeometry, Intersection, Material, Mesh, Ray, Side } from 'th
 import type { MeshBVH } from 'three-mesh-bvh';
 
 export interface BakeOptions {
-    /** How long to search, in seconds. 1 if neither `seconds` nor `work` is given. */
+    /** How long to search, in seconds. 1 if neither `seconds` nor `work` is given; with both, the first ends the search. */
     seconds?: number;
     /** How much to search, in nodes visited: the same tree on every machine, as of `bvh bake --budget 50Mwork`. */
     work?: number;
@@ -23,9 +23,11 @@ export interface BakeOptions {
 
 /** A searched tree over the triangles of a geometry. It takes about 150 bytes of JavaScript's memory per triangle. */
 export class Tree {
+    /** Trees come from `bake`, `bakeInWorker` and `load`. */
+    private constructor();
     /**
-     * Reads a tree that was saved for this very geometry, of which another tree may have reordered the index since;
-     * rejects damaged bytes and other geometries.
+     * Reads a tree that was saved for this very geometry, of which `toMeshBVH` may have reordered the index since, but no
+     * `new MeshBVH`; rejects damaged bytes and other geometries.
      */
     static load(bytes: ArrayBufferLike | ArrayBufferView, geometry: BufferGeometry): Promise<Tree>;
     /** The tree as a file, which the program `bvh` and the interfaces of other languages read. */

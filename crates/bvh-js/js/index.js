@@ -72,6 +72,7 @@ export class Tree {
         const isInOrder = order.every((id, place) => id === place);
         // Another tree may be in use that needs the index in its own order.
         const { indirect = unordered !== undefined || (places !== undefined && !isInOrder) } = options;
+        if (typeof indirect !== 'boolean') throw new TypeError(`indirect is ${indirect}; accepted: true or false`);
         if (!indirect && unordered) throw new Error(`indirect is false; accepted: true for a geometry ${unordered}`);
         const data = { version: 1, roots: [nodes.slice().buffer], index: null, indirectBuffer: indirect ? order : null };
         if (!indirect && !(isInOrder && geometry.index)) {
@@ -166,6 +167,7 @@ async function inWorker(message, onProgress, signal) {
 }
 
 export async function costOf(meshBVH) {
+    if (!(meshBVH instanceof MeshBVH)) throw new TypeError('costOf of another object; accepted: a MeshBVH of three-mesh-bvh');
     await ready();
     const { roots, indirectBuffer } = MeshBVH.serialize(meshBVH, { cloneBuffers: false });
     if (roots.length !== 1) throw new Error(`the tree has ${roots.length} roots; accepted: one`);
@@ -196,12 +198,13 @@ function checked(options, more = []) {
     const { seconds = work === undefined ? 1 : undefined } = options;
     const check = (name, value, accepted, isAccepted) => {
         if (value !== undefined && !(typeof value === 'number' && isAccepted(value))) {
-            throw new RangeError(`${name} is ${value}; accepted: ${accepted}`);
+            const found = typeof value === 'string' ? `"${value}"` : value;
+            throw new RangeError(`${name} is ${found}; accepted: ${accepted}`);
         }
     };
     check('seconds', seconds, 'a number above 0', (value) => value > 0);
-    check('work', work, 'a whole number above 0', (value) => value > 0 && Number.isSafeInteger(value));
-    check('seed', seed, 'a whole number from 0 on', (value) => value >= 0 && Number.isSafeInteger(value));
+    check('work', work, 'a whole number above 0, below 2^53', (value) => value > 0 && Number.isSafeInteger(value));
+    check('seed', seed, 'a whole number from 0 on, below 2^53', (value) => value >= 0 && Number.isSafeInteger(value));
     check('references', references, 'a number from 1 to 16', (value) => value >= 1 && value <= 16);
     if (typeof orients !== 'boolean') throw new TypeError(`orient is ${orients}; accepted: true or false`);
     if (onProgress !== undefined && typeof onProgress !== 'function') {

@@ -36,6 +36,7 @@ class CountingOrigin extends Vector3 {
 const counting = new CountingRay();
 
 export function countTests(meshBVH, ray, { side, near, far, query = 'raycastFirst' } = {}) {
+    if (!/^raycast(First)?$/.test(query)) throw new TypeError(`query is "${query}"; accepted: raycastFirst, raycast`);
     plain.copy(ray);
     counting.origin.y = ray.origin.y;
     counting.origin.z = ray.origin.z;

@@ -617,7 +617,7 @@ test('wrong arguments and geometries are named', async () => {
     const cases = [
         [scene(), { seconds: -1 }, 'RangeError', /^seconds is -1/],
         [scene(), { work: 0.5 }, 'RangeError', /^work is 0.5/],
-        [scene(), { seed: '1' }, 'RangeError', /^seed is 1/],
+        [scene(), { seed: '1' }, 'RangeError', /^seed is "1"/],
         [scene(), { references: 0 }, 'RangeError', /^references is 0/],
         [scene(), { second: 1 }, 'TypeError', /option "second"; accepted: seconds/],
         [scene(), null, 'TypeError', /^options is null/],
@@ -629,6 +629,7 @@ test('wrong arguments and geometries are named', async () => {
         [new BufferGeometry(), {}, 'Error', /no position/],
         [changed((geometry) => geometry.setDrawRange(0, 0)), {}, 'Error', /no triangles/],
         [changed(({ index }) => index.setX(5, 65_000)), {}, 'RangeError', /^index\[5\] is 65000; accepted: 0 to \d+/],
+        [changed((geometry) => geometry.setIndex(new BufferAttribute(Int32Array.of(0, 1, 2, 3, -1, 5), 1))), {}, 'RangeError', /^index\[4\] is -1/],
         [changed(({ attributes }) => attributes.position.setY(3, NaN)), {}, 'RangeError', /^vertex 3 .*NaN/],
         [changed(({ morphAttributes }) => { morphAttributes.position = [new BufferAttribute(new Float32Array(3), 3)]; }),
             {}, 'Error', /morph.*accepted/],
@@ -640,5 +641,9 @@ test('wrong arguments and geometries are named', async () => {
     }
     const tree = await bake(scene(), { work: 100_000 });
     assert.throws(() => tree.toMeshBVH(scene(), { indirekt: true }), { name: 'TypeError', message: /option "indirekt"/ });
+    assert.throws(() => tree.toMeshBVH(scene(), { indirect: 'yes' }), { name: 'TypeError', message: /^indirect is yes/ });
+    const bvh = tree.toMeshBVH(scene());
+    assert.throws(() => countTests(bvh, new Ray(), { query: 'all' }), { name: 'TypeError', message: /^query is "all"/ });
+    await assert.rejects(costOf(scene()), { name: 'TypeError', message: /MeshBVH/ });
     assert.throws(() => tree.toMeshBVH(new Mesh(scene())), { name: 'TypeError', message: /^geometry is a Mesh/ });
 });
