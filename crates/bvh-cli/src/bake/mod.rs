@@ -6,7 +6,7 @@ mod plan;
 mod watch;
 
 use crate::Error;
-use crate::answer::{Answer, frame_facts, gain, saved, short, whole};
+use crate::answer::{Answer, frame_facts, gain, saved, whole};
 use crate::arguments::{input_file, load_scene, output_file, output_or_free, precision_of};
 use crate::export::tracers;
 use crate::interrupt::{hold, is_interrupted};
@@ -197,11 +197,8 @@ fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> R
     }
     let bytes = found.save(out, reserved)?;
     if is_interrupted() {
-        let cost = short(found.baked.outcome.cost);
         let (out, next) = (out.display(), continues(out));
-        return Err(Error::Interrupted(format!(
-            "the best tree so far, of cost {cost}, is in {out}; {next}"
-        )));
+        return Err(Error::Interrupted(format!("the best tree so far is in {out}; {next}")));
     }
     let header = tree_file::header(out)?;
     answer.record("method", header.method.as_str());

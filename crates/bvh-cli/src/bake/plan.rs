@@ -129,7 +129,7 @@ impl Plan {
         watch.bar.suspend(|| chosen.reasons.iter().for_each(explain));
         let greedy = chosen.greedy.take();
         let plain = match &greedy {
-            Some(_) if is_turned(scene) => Some(arguments::greedy(scene)?),
+            Some(_) if is_turned(scene) && !is_interrupted() => Some(arguments::greedy(scene)?),
             _ => None,
         };
         let area = plain.as_ref().or(greedy.as_ref()).map(internal_area);
