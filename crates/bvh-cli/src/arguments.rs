@@ -19,7 +19,13 @@ pub fn load_scene(name: &str, precision: Precision) -> Result<Scene, SceneError>
 
 /// Loads the scene of a tree file with the precision of its triangles.
 pub fn scene_of(tree: &Path, name: &str) -> Result<Scene, Error> {
-    Ok(load_scene(name, precision_of(tree)?)?)
+    let precision = precision_of(tree).map_err(|error| match precision_of(Path::new(name)) {
+        Ok(_) => Error::Usage(format!(
+            "{name} is a tree file and no scene; accepted: first the tree, then its scene"
+        )),
+        Err(_) => error,
+    })?;
+    Ok(load_scene(name, precision)?)
 }
 
 /// Returns the precision of the triangles of a tree file.
@@ -28,14 +34,12 @@ pub fn precision_of(tree: &Path) -> Result<Precision, Error> {
     Ok(if is_double { Precision::Double } else { Precision::Single })
 }
 
-/// Returns the greedy tree over a scene: in its frame, or over triangles in f64 around their middle.
+/// Returns the greedy tree over a scene along the file's axes, as other libraries build it, with
+/// which every command compares; over triangles in f64 around their middle.
 pub fn greedy(scene: &Scene) -> Result<Bvh, Error> {
-    let frame = scene.frame.or_else(|| Some(DWideBvh::centred(scene.doubles().ok()?)));
-    let boxes = match &frame {
-        Some(frame) => &scene.primitives.boxes_in(Some(frame)),
-        None => &scene.boxes,
-    };
-    let greedy = muller_fellner::Config::default().build(boxes);
+    let frame = scene.doubles().ok().map(DWideBvh::centred);
+    let boxes = scene.primitives.boxes_in(frame.as_ref());
+    let greedy = muller_fellner::Config::default().build(&boxes);
     let greedy = greedy.map_err(Error::search(&scene.name, "muller_fellner"))?;
     Ok(Bvh { frame, ..greedy })
 }

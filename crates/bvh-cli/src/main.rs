@@ -25,6 +25,7 @@ use clap_complete::Shell;
 use error::Error;
 use inspect::InspectArgs;
 use output::{answered, print_bytes, print_error, succeeded};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -76,7 +77,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse_from(joined(std::env::args_os())) {
         Ok(cli) => cli,
         Err(answer) => return answered(&answer),
     };
@@ -89,6 +90,19 @@ fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Joins `--heatmap 50`, whose number the parser would take for a scene, because it is optional.
+fn joined(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut joined: Vec<OsString> = Vec::new();
+    for arg in args {
+        let is_number = arg.to_str().is_some_and(|arg| arg.parse::<u32>().is_ok());
+        match joined.last_mut().filter(|last| is_number && *last == "--heatmap") {
+            Some(last) => last.extend([OsString::from("="), arg]),
+            None => joined.push(arg),
+        }
+    }
+    joined
 }
 
 fn run(Cli { command, json, jobs }: Cli) -> Result<(), Error> {

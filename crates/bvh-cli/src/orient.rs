@@ -87,5 +87,6 @@ pub fn orient(args: &OrientArgs, answer: &mut Answer) -> Result<(), Error> {
     };
     answer.say(&format!("{}: {what}", out.display()));
     answer.record("turned", turned);
+    answer.record("file", out.display().to_string());
     Ok(())
 }

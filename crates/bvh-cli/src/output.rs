@@ -7,7 +7,8 @@ use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
 
 /// True if standard output has lost something.
 static LOST: AtomicBool = AtomicBool::new(false);
@@ -46,6 +47,48 @@ pub fn print_error(line: &str) {
 pub fn bar(length: u64, template: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(template);
     ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// The progress of a command: a bar, or without a terminal a line every ten seconds.
+pub struct Progress {
+    bar: ProgressBar,
+    unit: &'static str,
+    lines: Lines,
+}
+
+impl Progress {
+    /// Begins to count up to this number of units.
+    pub fn new(length: u64, unit: &'static str) -> Self {
+        let template = format!("{{wide_bar}} {{pos}}/{{len}} {unit}, {{eta}} left");
+        Self { bar: bar(length, &template), unit, lines: Lines::default() }
+    }
+
+    /// Counts so many more.
+    pub fn add(&self, count: u64) {
+        let Self { bar, unit, lines } = self;
+        bar.inc(count);
+        if bar.is_hidden() && lines.is_due(bar.elapsed()) {
+            let [done, all] = [bar.position(), bar.length().unwrap_or(0)];
+            print_error(&format!("{done} of {all} {unit} after {} s", bar.elapsed().as_secs()));
+        }
+    }
+
+    /// Removes the bar.
+    pub fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// The time of the last line, in tens of seconds since the beginning.
+#[derive(Default)]
+pub struct Lines(AtomicU64);
+
+impl Lines {
+    /// Returns whether this caller, of all threads, must show the next line.
+    pub fn is_due(&self, elapsed: Duration) -> bool {
+        let now = elapsed.as_secs() / 10;
+        self.0.load(Relaxed) < now && self.0.fetch_max(now, Relaxed) < now
+    }
 }
 
 /// Prints the parser's answer to the arguments: help, version, or their fault. Returns the exit

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::answer::{Answer, whole};
 use crate::arguments::{greedy, input_file, load_scene, output_file, precision_of};
-use crate::output::{bar, png};
+use crate::output::{Progress, png};
 use bvh_core::{Aabb, WideBvh};
 use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::rays::View;
@@ -118,10 +118,9 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
     let start = Instant::now();
     let accelerator = Accelerator::new(&scene.primitives, structure(&args.accel, &scene)?);
     let built = start.elapsed().as_secs_f64();
-    let bar = bar(options.height.into(), "{msg} {wide_bar} {pos}/{len} rows, {eta} left");
-    bar.set_message(scene.name.clone());
-    let film = draw(&scene, &accelerator, &options, &|| bar.inc(1));
-    bar.finish_and_clear();
+    let progress = Progress::new(options.height.into(), "rows");
+    let film = draw(&scene, &accelerator, &options, &|| progress.add(1));
+    progress.end();
     let rendered = start.elapsed().as_secs_f64() - built;
     let heat::Range { median, top: common } = heat::range(film.tests.clone());
     let rays_per_pixel = f64::from(options.samples * options.samples);
@@ -149,6 +148,7 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
         answer.fact("tests per ray of the last colour of --heatmap", top);
     }
     answer.say(&format!("picture: {}", args.out.display()));
+    answer.record("file", args.out.display().to_string());
     Ok(())
 }
 

@@ -146,6 +146,10 @@ impl Scene {
             let spheres = Primitives::Spheres(spheres::spheres(count));
             return Ok(Self::new(name, SceneKind::Procedural, spheres));
         }
+        if name == "-" {
+            let message = "no scene is read from a pipe; accepted: a name, or the path of a file";
+            return Err(SceneError::new(name, message));
+        }
         let path = match FETCHED.iter().find(|(fetched, _)| *fetched == name) {
             Some((_, package)) => fetched_path(name).ok_or_else(|| {
                 let message = format!(

@@ -119,6 +119,41 @@ impl Chosen {
             None => Objective::Layout.cost(tree),
         }
     }
+
+    /// The same tests per ray that enters the tree, or by random lines in units of area: numbers that
+    /// compare with those of trees along other axes. O(nodes).
+    pub fn tests_per_ray(&self, tree: &Bvh) -> f64 {
+        per_ray(tree, self.judging.as_ref().or(self.density.as_ref()))
+    }
+
+    /// The [tests per ray](Self::tests_per_ray) in a tree along other axes than the bake's, for which
+    /// it makes the same rays again by what was open and the seed of the bake. `None` soon after
+    /// `is_over` returns true.
+    pub fn tests_along(
+        &self,
+        open: &Open,
+        seed: u64,
+        tree: &Bvh,
+        is_over: &dyn Fn() -> bool,
+    ) -> Result<Option<f64>, DensityError> {
+        let made = match (&self.judging, &self.density) {
+            (Some(_), _) => open.anywhere.map(|rays| (rays, Open::JUDGING)),
+            (None, Some(_)) => open.rays.or(open.anywhere).map(|rays| (rays, seed)),
+            (None, None) => None,
+        };
+        match made {
+            Some((rays, seed)) => {
+                Ok(rays(tree, seed, is_over)?.map(|density| per_ray(tree, Some(&density))))
+            }
+            None => Ok(Some(per_ray(tree, None))),
+        }
+    }
+}
+
+fn per_ray(tree: &Bvh, density: Option<&RayDensity>) -> f64 {
+    let Some(density) = density else { return Objective::Layout.cost(tree) };
+    let root = density.measure(&tree.root_aabb().unwrap_or(Aabb::EMPTY));
+    Objective::Layout.cost_by(tree, density) / if root > 0.0 { root } else { 1.0 }
 }
 
 /// A combination of choices.

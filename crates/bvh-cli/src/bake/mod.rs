@@ -6,7 +6,7 @@ mod plan;
 mod watch;
 
 use crate::Error;
-use crate::answer::{Answer, frame_facts, gain, saved, short, whole};
+use crate::answer::{Answer, frame_facts, gain, saved, whole};
 use crate::arguments::{input_file, load_scene, output_file, output_or_free, precision_of};
 use crate::export::tracers;
 use crate::interrupt::{hold, is_interrupted};
@@ -15,14 +15,14 @@ use bvh_core::Aabb;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_scenes::files::Reserved;
-use bvh_scenes::{Precision, Scene};
+use bvh_scenes::{Precision, Scene, tree_file};
 use bvh_search::{
     Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
 };
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use effort::Effort;
-use plan::{Found, Plan, Start};
+use plan::{Found, Plan, Start, is_turned};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use watch::Watch;
@@ -190,31 +190,36 @@ fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), Error> {
 fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> Result<(), Error> {
     if is_interrupted() && found.is_behind(out) {
         return Err(Error::Interrupted(format!(
-            "{0} keeps its tree, which is better than the one so far; `--from {0}` continues",
-            out.display()
+            "{0} keeps its tree, which is better than the one so far; {1}",
+            out.display(),
+            continues(out)
         )));
     }
     let bytes = found.save(out, reserved)?;
     if is_interrupted() {
-        let out = out.display();
-        let cost = short(found.baked.outcome.cost);
-        return Err(Error::Interrupted(format!(
-            "the best tree so far, of cost {cost}, is in {out}; `--from {out}` continues"
-        )));
+        let (out, next) = (out.display(), continues(out));
+        return Err(Error::Interrupted(format!("the best tree so far is in {out}; {next}")));
     }
-    summarise(found, answer);
+    let header = tree_file::header(out)?;
+    answer.record("method", header.method.as_str());
+    answer.record("cost", header.cost);
+    summarise(found, &header.method, answer);
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
     answer.record("file", out.display().to_string());
     answer.record("bytes", bytes);
     Ok(())
 }
 
-fn summarise(found: &Found, answer: &mut Answer) {
+/// Says how to go on after an interruption. The file takes the default name of the next bake.
+fn continues(out: &Path) -> String {
+    format!("`--from {0} --out {0}` continues, `--out {0}` begins again", out.display())
+}
+
+fn summarise(found: &Found, method: &str, answer: &mut Answer) {
     let Found { plan, scene, chosen, baked, greedy, seconds, .. } = found;
     let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
     let objects = scene.boxes.len();
     let references = tree.prim_ids.len();
-    let method = plan.method.name();
     answer.say(&format!(
         "{} ({}), {} objects, {method}, seed {}",
         scene.name,
@@ -225,7 +230,6 @@ fn summarise(found: &Found, answer: &mut Answer) {
     answer.record("scene", scene.name.as_str());
     answer.record("objects", objects);
     answer.record("references", references);
-    answer.record("method", method);
     answer.record("frame", frame_facts(tree.frame.as_ref()));
     answer.record("seed", plan.seed);
     let area = internal_area(tree);
@@ -233,7 +237,7 @@ fn summarise(found: &Found, answer: &mut Answer) {
     if let Some(base) = greedy.area {
         let mut gains = format!("{} area of inner nodes", gain(area, base));
         if let Some(base) = greedy.tests {
-            let tests = chosen.tests(tree);
+            let tests = chosen.tests_per_ray(tree);
             gains = format!("{} tests of rays, {gains}", gain(tests, base));
             answer.record("tests_saved", saved(tests, base));
         }
@@ -241,16 +245,22 @@ fn summarise(found: &Found, answer: &mut Answer) {
         answer.record("greedy_area", base);
         answer.record("saved", saved(area, base));
     }
-    answer.record("cost", *cost);
+    // The cost in the file is that for random lines and whole objects.
+    answer.record("minimised_cost", *cost);
     // The gain in area is no measure of a search for another cost.
     if let (Some(base), Some(unit)) = (baked.greedy_cost, found.unit()) {
         let gain = gain(*cost, base);
-        answer.say(&format!("{unit}, which was minimised, {gain} against the greedy tree"));
-        answer.record("greedy_cost", base);
+        // A cost for rays is known along the axes of its density.
+        let (axes, key) = match is_turned(scene) {
+            true => (" along the same axes", "minimised_cost_of_greedy_along_the_same_axes"),
+            false => ("", "minimised_cost_of_greedy"),
+        };
+        answer.say(&format!("{unit}, which was minimised, {gain} against the greedy tree{axes}"));
+        answer.record(key, base);
     }
     if let Some(before) = baked.start_cost {
         answer.say(&format!("{} cost against the tree it started from", gain(*cost, before)));
-        answer.record("start_cost", before);
+        answer.record("minimised_cost_of_start", before);
     }
     if references > objects {
         answer.say(&format!("{} references to {} objects", whole(references), whole(objects)));
@@ -283,7 +293,10 @@ fn summarise(found: &Found, answer: &mut Answer) {
 fn next(args: &BakeArgs, found: &Found, out: &Path, answer: &Answer) {
     let (out, scene) = (out.display(), &args.scene);
     let tracer = args.tracer.map_or("TRACER", |target| target.name);
-    let mut commands = format!("`bvh bench {out} {scene}`, `bvh report {out} {scene}`");
+    let mut commands = format!("`bvh report {out} {scene}`");
+    if found.scene.has_triangles() {
+        commands = format!("`bvh bench {out} {scene}`, {commands}");
+    }
     if found.scene.frame.is_none() && found.scene.triangles().is_ok() {
         commands += &format!(", `bvh export {out} {scene} --for {tracer} --out FILE`");
     }

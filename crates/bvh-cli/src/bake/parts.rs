@@ -223,7 +223,8 @@ fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Erro
     ));
     answer.list(
         "trees",
-        json!({ "file": file, "objects": objects, "cost": cost, "greedy_cost": base }),
+        json!({ "file": file, "objects": objects, "minimised_cost": cost,
+            "minimised_cost_of_greedy": base }),
     );
     Ok(())
 }

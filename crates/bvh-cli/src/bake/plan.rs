@@ -4,7 +4,8 @@ use super::effort::Effort;
 use super::watch::Watch;
 use crate::Error;
 use crate::answer::Answer;
-use crate::interrupt::{INTERRUPTED, hold};
+use crate::arguments;
+use crate::interrupt::{INTERRUPTED, hold, is_interrupted};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::file::Header;
@@ -16,6 +17,7 @@ use bvh_search::{
     self, Bake, BakeError, Baked, Budget, Chosen, Division, MadeRays, Method, Observer, Open,
     Reason,
 };
+use glam::DMat3;
 use std::path::Path;
 
 /// A search for the best tree of any scene.
@@ -111,23 +113,34 @@ impl Plan {
         let bake = Bake { start: start.map(|start| &start.tree), ..self.bake(scene) };
         // Without time, the greedy tree is the answer.
         let greedy = bake.greedy(&INTERRUPTED).map_err(failed)?;
-        let area = greedy.as_ref().map(internal_area);
         let rays = self.rays.as_ref();
         let made = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
             rays.unwrap_or(&Rays::Default).density(scene, tree, seed, is_over)
         };
         let rays: Option<MadeRays> = if rays.is_some() { Some(&made) } else { None };
         let untimed: &dyn Observer = if open.budget { &watch } else { &INTERRUPTED };
-        let chosen = bake.choose(&Open { rays, ..*open }, greedy, untimed);
-        let mut chosen = chosen.map_err(|error| match error {
+        let open = Open { rays, ..*open };
+        let traced = |source| Error::Tracing { scene: scene.name.clone(), source };
+        let mut chosen = bake.choose(&open, greedy, untimed).map_err(|error| match error {
             BakeError::Search(error) => failed(error),
-            BakeError::Rays(source) => Error::Tracing { scene: scene.name.clone(), source },
+            BakeError::Rays(source) => traced(source),
         })?;
         let explain = |reason: &Reason| answer.line("choices", reason.to_string());
         watch.bar.suspend(|| chosen.reasons.iter().for_each(explain));
         let greedy = chosen.greedy.take();
-        let is_traced = scene.has_triangles();
-        let tests = greedy.as_ref().filter(|_| is_traced).map(|tree| chosen.tests(tree));
+        let plain = match &greedy {
+            Some(_) if is_turned(scene) && !is_interrupted() => Some(arguments::greedy(scene)?),
+            _ => None,
+        };
+        let area = plain.as_ref().or(greedy.as_ref()).map(internal_area);
+        let tests = match &plain {
+            Some(plain) => {
+                chosen.tests_along(&open, self.seed, plain, &is_interrupted).map_err(traced)?
+            }
+            None => greedy.as_ref().map(|tree| chosen.tests_per_ray(tree)),
+        };
+        let tests = tests.filter(|_| scene.has_triangles());
+        drop(plain);
         let tried = chosen.tried.take();
         let is_tried = tried.is_some();
         let settled = chosen.bake(&bake);
@@ -146,11 +159,16 @@ impl Plan {
     }
 }
 
-/// What the greedy tree costs, if there was one.
+/// Returns whether the boxes lie along other axes than the file's.
+pub fn is_turned(scene: &Scene) -> bool {
+    scene.frame.is_some_and(|frame| frame.rotation() != DMat3::IDENTITY)
+}
+
+/// What the greedy tree along the file's axes costs, if there was one.
 pub struct Greedy {
     /// The total area of inner nodes, which the documentation compares.
     pub area: Option<f64>,
-    /// The tests of rays in the wide layout.
+    /// The tests per ray in the wide layout.
     pub tests: Option<f64>,
 }
 

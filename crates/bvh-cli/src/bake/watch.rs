@@ -3,7 +3,7 @@
 use super::effort::Effort;
 use crate::answer::gain;
 use crate::interrupt::is_interrupted;
-use crate::output::{bar, print_error};
+use crate::output::{Lines, bar, print_error};
 use bvh_search::{Deadline, Event, Observer};
 use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -22,8 +22,7 @@ pub struct Watch {
     effort: Option<Effort>,
     /// The bits of the first cost, NaN before.
     first: AtomicU64,
-    /// The time of the last line, in tens of seconds since the beginning.
-    shown: AtomicU64,
+    lines: Lines,
 }
 
 impl Watch {
@@ -35,19 +34,13 @@ impl Watch {
             deadline: Deadline::after(limit),
             effort,
             first: AtomicU64::new(f64::NAN.to_bits()),
-            shown: AtomicU64::new(0),
+            lines: Lines::default(),
         }
     }
 
     /// Continues with this budget of work, if there is one.
     pub fn within(self, work: Option<u64>) -> Self {
         Self { effort: work.map(Effort::Work).or(self.effort), ..self }
-    }
-
-    /// Returns whether this caller, of all threads of the search, must show the next line.
-    fn is_due(&self, elapsed: Duration) -> bool {
-        let now = elapsed.as_secs() / 10;
-        self.shown.load(Relaxed) < now && self.shown.fetch_max(now, Relaxed) < now
     }
 
     fn line(&self, elapsed: Duration) -> String {
@@ -86,7 +79,7 @@ impl Observer for Watch {
             self.bar.set_position((LENGTH * done) as u64);
         }
         let elapsed = self.deadline.elapsed();
-        if self.is_due(elapsed) && self.bar.is_hidden() {
+        if self.lines.is_due(elapsed) && self.bar.is_hidden() {
             print_error(&self.line(elapsed));
         }
         is_interrupted() || self.deadline.cancelled()
@@ -116,7 +109,7 @@ mod tests {
         assert_eq!(line(), "searching, cost −37.5 % after 12 s, 25.5 % of the budget");
         // Whichever thread comes first.
         let times = [0.0, 9.9, 10.0, 10.1, 45.0, 39.0, 49.9, 50.0];
-        let due = times.map(|seconds| watch.is_due(Duration::from_secs_f64(seconds)));
+        let due = times.map(|seconds| watch.lines.is_due(Duration::from_secs_f64(seconds)));
         assert_eq!(due, [false, false, true, false, true, false, false, true]);
     }
 }

@@ -61,7 +61,12 @@ pub fn place(text: &str) -> Result<Location, String> {
 pub fn date(text: &str) -> Result<Date, String> {
     let midnight = parse_rfc3339_weak(&format!("{text} 00:00:00")).ok();
     let since = midnight.and_then(|midnight| midnight.duration_since(UNIX_EPOCH).ok());
-    let Some(since) = since else { return Err("accepted: a date as in 2026-03-21".into()) };
+    let Some(since) = since else {
+        let is_date = text.split('-').map(str::len).eq([4, 2, 2])
+            && text.bytes().all(|byte| byte == b'-' || byte.is_ascii_digit());
+        let fault = if is_date { "there is no such day since 1970; " } else { "" };
+        return Err(format!("{fault}accepted: a date as in 2026-03-21"));
+    };
     Ok(Date { name: text.to_owned(), julian: 2_440_587.5 + since.as_secs_f64() / 86_400.0 })
 }
 
@@ -188,6 +193,9 @@ mod tests {
         assert!(weights.chunks(3).all(|hours| hours[0] == hours[1] + hours[2]));
         let night = [date("2026-12-21").unwrap()];
         assert!(sun(super::place("80,0").unwrap(), &night, 30).is_err());
-        assert!(date("2026-02-30").is_err());
+        for (wrong, is_named) in [("2026-02-30", true), ("1969-12-31", true), ("30.2.2026", false)]
+        {
+            assert_eq!(date(wrong).unwrap_err().contains("no such day"), is_named, "{wrong}");
+        }
     }
 }

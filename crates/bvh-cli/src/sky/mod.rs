@@ -8,7 +8,7 @@ use crate::Error;
 use crate::answer::{Answer, short, whole};
 use crate::arguments::{input_file, load_scene, output_file};
 use crate::bench::Layout;
-use crate::output::bar;
+use crate::output::Progress;
 use crate::render::CameraArgs;
 use bvh_core::{Aabb, Sky, View, WideBvh, neighbours};
 use bvh_scenes::rays::Camera;
@@ -41,7 +41,7 @@ pub struct SkyArgs {
     /// The file to write, replaced when it is complete: `.csv` with a line for each point; `.ply` or
     /// `.glb` with colours; or a `.png` picture, which has a point in each pixel, on the side
     /// towards the eye.
-    #[arg(long, value_name = "FILE.csv|.ply|.glb|.png")]
+    #[arg(short, long, value_name = "FILE.csv|.ply|.glb|.png")]
     pub out: PathBuf,
     /// Where the points are: in the middle of each triangle, or at each vertex, with the mean of the
     /// normals by area.
@@ -209,8 +209,7 @@ fn seen(
         normals => normals.clone(),
     };
     let sides: &[f64] = if args.two_sided { &[1.0, -1.0] } else { &[1.0] };
-    let bar =
-        bar((points.at.len() * sides.len()) as u64, "{wide_bar} {pos}/{len} points, {eta} left");
+    let progress = Progress::new((points.at.len() * sides.len()) as u64, "points");
     let mut values = Vec::new();
     for &side in sides {
         let at = points.above(side * offset);
@@ -218,13 +217,13 @@ fn seen(
             .as_ref()
             .map(|normals| normals.iter().map(|normal| normal * side as f32).collect());
         let view = View { points: &at, normals: normals.as_deref() };
-        let seen = seen_from(&looks.sky, wide, view, looks.by_cosine, &|count| bar.inc(count));
+        let seen = seen_from(&looks.sky, wide, view, looks.by_cosine, &|count| progress.add(count));
         values = match values.is_empty() {
             true => seen,
             false => values.iter().zip(seen).map(|(one, other)| one.max(other)).collect(),
         };
     }
-    bar.finish_and_clear();
+    progress.end();
     values
 }
 

@@ -14,7 +14,7 @@ fn interrupted(folder: &Path, bake: &str, after: Duration) {
     wait_until("the file", || fs::read_dir(folder).unwrap().count() != before);
     std::thread::sleep(after);
     send("-INT", &child);
-    ended(&child.wait_with_output().unwrap(), 130, &["`--from a.bvh` continues"]);
+    ended(&child.wait_with_output().unwrap(), 130, &["`--from a.bvh --out a.bvh` continues"]);
 }
 
 #[test]

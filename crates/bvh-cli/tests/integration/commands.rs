@@ -47,6 +47,7 @@ fn folder() -> tempfile::TempDir {
     write("file", b"");
     write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("mesh.ply", b"ply\n");
+    write("picture.glb", b"\x89PNG\r\n\x1a\n");
     write("down.csv", b"x,y,z,w\n0,0,1,1\n\n0,0,0,1\n");
     write("heavy.csv", b"0,0,1,1\n0,0,1,inf\n");
     write("yxz.csv", b"y,x,z\n0,0,1\n");
@@ -92,9 +93,14 @@ orient mesh.obj --out=mesh.obj ! --out: mesh.obj is the scene | another name
 orient mesh.obj --out=x.glb ! --out | .obj
 orient no.glb --out=x.glb ! no.glb: no such file
 orient mesh.ply --out=x.ply ! mesh.ply: a file of the kind Ply | OBJ, glTF or GLB
-orient good.bvh --out=x.obj ! good.bvh
+orient good.bvh --out=x.obj ! good.bvh: a tree, not a scene
+orient picture.glb --out=x.glb ! picture.glb: a PNG picture
+verify spheres75 good.bvh ! good.bvh is a tree file | first the tree
+bench mesh.obj good.bvh ! good.bvh is a tree file | first the tree
 
 bake sofa LONG ! scene sofa: no such scene; accepted: bijou
+bake - LONG ! pipe | the path of a file
+bake picture.glb LONG ! picture.glb: a PNG picture
 bake esher LONG ! no such scene; did you mean escher?
 bake mash.obj LONG ! scene mash.obj: no such file; did you mean mesh.obj?
 bake no.glb LONG ! error: scene no.glb: no such file
@@ -153,6 +159,7 @@ sky mesh.obj --out=x.png --per=vertex ! a point in each pixel | .glb
 sky mesh.obj --out=x.csv --column=hours ! no column | hours | accepted: sky_view_factor
 sky mesh.obj --out=x.csv --sun=80,0 --dates=2026-12-21 ! --dates: the sun does not rise
 sky mesh.obj --out=x.csv --sun=47,8 ! --dates
+sky mesh.obj -o x.csv --sun=47,8 --dates=2026-02-30 ! --dates | no such day
 sky mesh.obj --out=x.csv --tree=good.bvh ! good.bvh | 75 objects
 render spheres75 --out=x.png --from=1,2 ! --from | three numbers
 ";
@@ -236,6 +243,8 @@ fn the_results_of_all_commands_are_printed_as_json() {
         ("bake escher --budget=10kwork --out=x.bvh --rays=through.csv", "seconds"),
         ("bake escher --budget=1Mwork --parts=2 --list", "parts"),
         ("render spheres75 --size=8x8 --out=x.png", "rays"),
+        ("render spheres75 --size=8x8 --out=x.png", "file"),
+        ("orient mesh.obj --out=x.obj", "file"),
         ("report good.bvh spheres75", "depth"),
         ("sky mesh.obj --out=x.ply", "mean"),
         ("verify good.bvh spheres75", "valid"),

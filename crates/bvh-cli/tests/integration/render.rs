@@ -25,7 +25,7 @@ fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
     fs::write(at.join("a&b.obj"), "v 0 0 0\nv 1e30 0 0\nv 0 0 1e30\nf 1 2 3\n").unwrap();
     for scene in ["point.obj", "a&b.obj"] {
         for eye in ["", "--from=-1,2,3 --at=-1,2,3", "--from=1,2,3"] {
-            bvh(at, &format!("render {scene} --out=p.png --size=20x10 --heatmap {eye}"));
+            bvh(at, &format!("render {scene} --out=p.png --size=20x10 --heatmap 9 {eye}"));
             bvh(at, &format!("render {scene} --out=p.png --size=1x1 {eye}"));
         }
         bvh(at, &format!("bake {scene} --out={scene}.bvh --budget=0s"));
@@ -43,15 +43,21 @@ fn a_report_compares_a_tree_with_the_greedy_tree_on_one_page_and_replaces_no_fil
         bvh(at, &format!("bake {scene} --budget=1Mwork --out=a.bvh"));
         let title = bvh(at, &format!("report a.bvh {scene} --out=a.html"));
         let title = title.trim_end().strip_prefix("a.html: ").unwrap();
-        assert!(title.ends_with(" % cheaper than a plain build"), "{title}");
+        assert!(title.ends_with(" % area against a plain build"), "{title}");
         let page = fs::read_to_string(at.join("a.html")).unwrap();
         for part in [title, "Area of inner nodes", "greedy tree: median"] {
             assert!(page.contains(part), "{scene}: {part}");
         }
         assert_eq!(page.matches("data:image/png;base64,").count(), 3, "{scene}");
         assert!(!page.contains("://") && !page.contains("<script"), "{scene}");
-        assert_eq!(page.contains("Expected tests of a ray"), has_layout, "{scene}");
+        assert_eq!(page.contains("<td>Tests per ray</td>"), has_layout, "{scene}");
+    }
+    // The first words are about what the tree was searched for.
+    for flags in ["--rays=default", "--cost=layout"] {
+        bvh(at, &format!("bake escher:500 --budget=1Mwork --out=r.bvh {flags}"));
+        let title = bvh(at, "report r.bvh escher:500 --out=a.html");
+        assert!(title.contains('−') && title.contains("tests per ray"), "{title}");
     }
     wrong(at, "report a.bvh spheres75", &["a.html exists", "--out"]);
-    assert_eq!(names(at), ["a.bvh", "a.html"]);
+    assert_eq!(names(at), ["a.bvh", "a.html", "r.bvh"]);
 }

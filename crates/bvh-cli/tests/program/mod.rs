@@ -114,6 +114,8 @@ pub fn refused(folder: &Path, args: &[&str], code: i32, parts: &[&str]) {
 pub fn ended(output: &Output, code: i32, parts: &[&str]) {
     let message = text(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{parts:?}: {message}");
+    let listed = include_str!("../../README.md").contains(&format!("\n| {code} | "));
+    assert!(listed, "the list of exit codes lacks {code}");
     for part in parts {
         assert!(message.contains(part), "{part} in {message}");
     }

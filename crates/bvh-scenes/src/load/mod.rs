@@ -106,22 +106,11 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
 }
 
 fn parse_as<T: FromFile>(bytes: &[u8], path: &Path) -> Result<Mesh<T>, MeshError> {
-    let is_utf_16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
-    let parsed = match Format::of(bytes, path) {
-        _ if bytes.trim_ascii().is_empty() => {
-            Err(Fault::of_file("empty; expected an OBJ, PLY, STL or glTF file"))
-        }
-        _ if is_utf_16 && !stl::is_binary(bytes) => {
-            Err(Fault::of_file("the text is UTF-16; expected UTF-8 or ASCII"))
-        }
-        _ if other::kind(bytes).is_some() && !stl::is_binary(bytes) => {
-            let found = other::kind(bytes).unwrap_or_default();
-            Err(Fault::of_file(format!("{found}; expected an OBJ, PLY, STL or glTF file")))
-        }
+    let parsed = other::check(bytes).and_then(|()| match Format::of(bytes, path) {
         Format::Obj => obj::parse(bytes),
         Format::Ply => ply::parse(bytes),
         Format::Stl => stl::parse(bytes),
         Format::Gltf => gltf::parse(bytes, path),
-    };
+    });
     parsed.map_err(MeshError::of(path))
 }

@@ -1,7 +1,7 @@
 //! Mesh files whose meshes stand along axes of their own, with the rotation back beside them.
 
 use super::mesh::{Fault, Mesh};
-use super::{Format, MeshError, gltf, obj};
+use super::{Format, MeshError, gltf, obj, other};
 use bvh_core::Triangle;
 use glam::DMat3;
 use std::path::Path;
@@ -33,7 +33,7 @@ pub struct Oriented {
 /// The faults of [`parse`](super::parse); another format; a folder of `out` in which the files that
 /// the file names are not; 4 GB of GLB.
 pub fn orient(bytes: &[u8], path: &Path, out: &Path, find: Find) -> Result<Oriented, MeshError> {
-    let oriented = match Format::of(bytes, path) {
+    let oriented = other::check(bytes).and_then(|()| match Format::of(bytes, path) {
         Format::Gltf => gltf::orient(bytes, path, out, find),
         Format::Obj => obj::parse(bytes).and_then(|mesh: Mesh| {
             let rotation = find(0, &mesh.triangles);
@@ -44,6 +44,6 @@ pub fn orient(bytes: &[u8], path: &Path, out: &Path, find: Find) -> Result<Orien
         other => {
             Err(Fault::of_file(format!("a file of the kind {other:?}; expected OBJ, glTF or GLB")))
         }
-    };
+    });
     oriented.map_err(MeshError::of(path))
 }

@@ -15,7 +15,8 @@ fn malicious_files_are_rejected() {
     }
     for length in [13, glb().len() - 60, glb().len() - 1] {
         let message = error(&glb()[..length], "a.glb");
-        assert!(message.contains("expected a GLB file, and whole"), "{message}");
+        let cut = format!("cut: {length} of {} bytes", glb().len());
+        assert!(message.contains(&cut), "{message}");
     }
     let deep = format!("{}1{}", "[".repeat(100_000), "]".repeat(100_000));
     error(format!(r#"{{"asset": {deep}}}"#), "a.gltf");

@@ -391,6 +391,8 @@ fn files_of_other_kinds_are_rejected_by_their_kind() {
         (b"BLENDER-v300", "Blender"),
         (b"OFF\n3 1 0\n", "OFF"),
         (b"DRACO\x02\x02", "Draco"),
+        (b"\x89PNG\r\n\x1a\n", "PNG"),
+        (b"\xff\xd8\xff\xe0", "JPEG"),
     ] {
         for name in ["a.obj", "a.stl", "a.glb", "a"] {
             assert_refused(bytes, name, &[kind, "expected an OBJ, PLY, STL or glTF file"]);

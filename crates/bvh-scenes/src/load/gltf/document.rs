@@ -203,9 +203,7 @@ type Chunks<'a> = (&'a [u8], Option<&'a [u8]>, &'a [u8]);
 pub fn text(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
     let (json, chunk, further) = match bytes.starts_with(b"glTF") {
         true if bytes.get(4..8) == Some(&[1, 0, 0, 0]) => return Err(of_version("1")),
-        true => chunks(bytes).ok_or_else(|| {
-            Fault::of_file("no chunk of JSON in version 2; expected a GLB file, and whole")
-        })?,
+        true => chunks(bytes)?,
         false => (bytes, None, &[][..]),
     };
     let json = without_mark(json);
@@ -255,19 +253,19 @@ pub fn is_covered(extension: &str) -> bool {
     COVERED.split(' ').any(|covered| covered == extension)
 }
 
-fn chunks(bytes: &[u8]) -> Option<Chunks<'_>> {
-    if bytes.get(4..8)? != [2, 0, 0, 0] {
-        return None;
-    }
-    let length = u32::from_le_bytes(*bytes.get(8..)?.first_chunk()?) as usize;
+fn chunks(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
+    let number = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
+    let fault = || Fault::of_file("no chunk of JSON in version 2; expected a GLB file, and whole");
+    let length = number(8).filter(|_| number(4) == Some(2)).ok_or_else(fault)? as usize;
     if bytes.len() < length {
-        return None;
+        let found = bytes.len();
+        return Err(Fault::of_file(format!("cut: {found} of {length} bytes; expected all")));
     }
     // The file's header has 12 bytes, and each chunk's header has 8.
-    let json = chunk(bytes, 12, b"JSON")?;
+    let json = chunk(bytes, 12, b"JSON").ok_or_else(fault)?;
     let binary = chunk(bytes, 20 + json.len(), b"BIN\0");
     let end = 20 + json.len() + binary.map_or(0, |binary| 8 + binary.len());
-    Some((json, binary, bytes[..length].get(end..).unwrap_or_default()))
+    Ok((json, binary, bytes[..length].get(end..).unwrap_or_default()))
 }
 
 /// Returns the contents of the chunk whose header begins at `offset`, if it has this kind.
