@@ -64,8 +64,12 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         let bytes = to_bytes(&broken, Path::new("cells.csv"))?;
         output.unwritten.push(("Broken promises".into(), bytes));
     }
-    let caption = "A mark per case and method. Empty where the case has no check of it.";
-    output.add_figure("matrix", caption, 1, panels(&cells));
+    let methods = distinct(cells.iter().map(|cell| cell.method.as_str()));
+    let caption = format!(
+        "A mark per case and method; none where the case has no check of it. From the left: {}.",
+        methods.join(" · ")
+    );
+    output.add_figure("matrix", &caption, 1, panels(&cells));
     Ok(output)
 }
 
