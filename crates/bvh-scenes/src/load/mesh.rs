@@ -60,7 +60,7 @@ impl FromFile for DTriangle {
     }
 
     fn of(corners: [DVec3; 3]) -> Self {
-        corners.map(DVec3::to_array).into()
+        corners.map(|corner| corner.to_array()).into()
     }
 
     fn is_degenerate(&self) -> bool {
