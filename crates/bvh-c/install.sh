@@ -12,6 +12,7 @@ set -eu
 }
 here=$(CDPATH= cd -- "$(dirname -- "$0")" && pwd)
 target=${CARGO_TARGET_DIR:-$here/target}
+echo "install.sh: builds the library, which takes some minutes" >&2
 cargo build --quiet --release --manifest-path "$here/Cargo.toml" --target-dir "$target"
 release=$target/${CARGO_BUILD_TARGET:+$CARGO_BUILD_TARGET/}release
 

@@ -97,7 +97,8 @@ public:
   }
 
   // A point is inside if the half line from it leaves the volume before it enters it. Where it does
-  // both at once, it meets an edge, and another half line decides. A point on a face is inside.
+  // both at once, it meets an edge, and another half line decides. A point on a face is inside if the
+  // half line leaves the volume there.
   bool point_in_volume(TreeID tree, const Position& point, const Direction* direction = nullptr,
                        const std::vector<MeshID>* exclude_primitives = nullptr) const override {
     const Tree& faces = trees_.at(tree);

@@ -28,7 +28,8 @@ typedef enum {
     BVS_COST_INTERNAL_AREA = 0,
     // The cost of Goldsmith and Salmon.
     BVS_COST_GOLDSMITH_SALMON = 1,
-    // The surface area heuristic with both constants 1.
+    // The surface area heuristic with both constants 1, relative to the root's box: in a frame
+    // that makes this box smaller it may rise, although the area falls.
     BVS_COST_SAH = 2,
     // The cost of the layout that `bvs_tracer_new` makes.
     BVS_COST_LAYOUT = 3,
@@ -36,7 +37,7 @@ typedef enum {
 
 // The side from which a ray comes to a triangle.
 typedef enum {
-    // Either side.
+    // Either side. A ray in the plane of a triangle never hits it, whatever the orientation.
     BVS_ORIENTATION_ANY = 0,
     // Along the normal, on whose side the corners run counterclockwise: the ray leaves a solid.
     BVS_ORIENTATION_EXITING = 1,
@@ -57,20 +58,22 @@ typedef struct BvsTracer BvsTracer;
 typedef struct BvsTracerF64 BvsTracerF64;
 
 // A tree with its objects. Any number of threads may read a tree at the same time. A thread that
-// improves or frees it must be the only user.
+// improves, updates or frees it must be the only user.
 typedef struct BvsTree BvsTree;
 
 // Boxes, or triangles between vertices. One of `boxes`, `vertices` and `vertices_f64` is given;
-// other fields that are 0 or null have their defaults.
+// other fields that are 0 or null have their defaults. Coordinates are finite numbers.
 typedef struct {
-    // The number of boxes or triangles.
+    // The number of boxes or triangles. 0 is an empty scene, also where arrays are given: calls
+    // succeed, and the tree is empty.
     size_t count;
     // 6 floats for each of `count` boxes: the lower corner, then the upper corner.
     const float *boxes;
     // 3 floats for each vertex.
     const float *vertices;
-    // 3 doubles for each vertex, each 0 or from 2^-150 to 2^120 in size. Trees over them are
-    // traced by `bvs_tracer_f64_new`. Their boxes lie in a frame with its centre in the middle.
+    // 3 doubles for each vertex, at most 2^120 in size; below 2^-150 they count as 0. Trees over
+    // them are traced by `bvs_tracer_f64_new`. Their boxes lie in a frame with its centre in the
+    // middle.
     const double *vertices_f64;
     // The number of vertices; without `indices` 0 is 3 * `count`.
     size_t vertex_count;
@@ -93,7 +96,8 @@ typedef struct {
     // The number of rays; 0 for a tree for random lines.
     size_t ray_count;
     // The average number of parts into which triangles may be divided among leaves, up to 16; 1 is
-    // for whole triangles. 0 is 1 with `work` or `seconds`, and chosen without.
+    // for whole triangles, as triangles that will move should be (see `bvs_tree_update`). 0 is 1
+    // with `work` or `seconds`, and chosen without.
     double references;
     // The time of the search in seconds; 0 is no limit. Without `seconds` and `work`, the search
     // chooses its work, its cost and its rays, as Python and the program `bvh` do.
@@ -105,7 +109,8 @@ typedef struct {
     // The seed of the random numbers, which is 1 by default in Python and in the program `bvh`.
     uint64_t seed;
     // 1 lets the boxes of triangles lie in a frame where that saves area, as by default in Python
-    // and in the program `bvh`: they are then no boxes for other tracers. 0 keeps the axes.
+    // and in the program `bvh`: they are then no boxes for other tracers. The choice takes at most
+    // a tenth of the budget. 0 keeps the axes.
     uint32_t frame;
 } BvsBake;
 
@@ -173,9 +178,13 @@ typedef struct {
 } BvsClosest;
 
 // The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any
-// length except 0; `t_min` is 0 or more; `t_max` may be infinite. Coordinates are
-// at most 2^120 in size, below 2^-150 they count as 0, and the largest component of a direction is
-// from 2^-100 to 2^100.
+// length except 0; `t_min` is 0 or more; `t_max` may be infinite. Coordinates are at most 2^120 in
+// size, below 2^-150 they count as 0, and the largest component of a direction is from 2^-100 to
+// 2^100.
+//
+// A ray hits a triangle if they meet in real arithmetic at the origin or in front of it, and the
+// real distance, rounded once, is from `t_min` to `t_max`. Edges and corners belong to a triangle:
+// where triangles share them, a ray hits all.
 typedef struct {
     // The point with t = 0.
     double origin[3];
@@ -193,8 +202,12 @@ typedef struct {
     uint32_t orientation;
     // The number of ids in `excluded` for each ray.
     uint32_t excluded_count;
-    // The indices of triangles that do not count, `excluded_count` for each ray; UINT32_MAX is
-    // none.
+    // The indices of triangles that do not count, `excluded_count` for each ray. Those that no
+    // triangle has, such as UINT32_MAX, are ignored.
+    //
+    // A particle that flies on in its direction keeps its origin: `t_min` becomes the distance of
+    // the last hit, and all triangles met at this distance are excluded, not only the last, because
+    // an edge has several. A ray from the hit point, which is rounded, may miss the next triangle.
     const uint32_t *excluded;
 } BvsSelect;
 
@@ -256,7 +269,8 @@ extern "C" {
 const char *bvs_version(void);
 
 // Returns the message of the last failed call of this thread, or an empty string if none has
-// failed. The string is valid until another call of this thread fails.
+// failed. The string is valid until another call of this thread fails. Ask after the call that
+// failed, in another statement: `printf("%d %s", f(), bvs_last_error())` may ask before.
 const char *bvs_last_error(void);
 
 // Searches for the best tree over `count` boxes for about `seconds`, 0 or more. Each box is 6
@@ -272,7 +286,10 @@ BvsTree *bvs_tree_from_boxes(const float *boxes, size_t count, double seconds);
 // `vertices` points to 9 * `count` floats.
 BvsTree *bvs_tree_from_triangles(const float *vertices, size_t count, double seconds, double references);
 
-// Searches for the best tree with these choices.
+// Searches for the best tree with these choices. Searches and other work on large trees run on as
+// many threads as the environment variable RAYON_NUM_THREADS says when the first begins, by default
+// on all processors. Calls that trace rays or look up points run on the thread that calls: several
+// threads may pass parts of an array each.
 //
 // `bake` is a search whose arrays have the promised lengths.
 BvsTree *bvs_tree_bake(const BvsBake *bake);
@@ -292,7 +309,9 @@ BvsStatus bvs_tree_improve(BvsTree *tree, double seconds);
 BvsStatus bvs_tree_improve_until(BvsTree *tree, double seconds, uint8_t (*cancelled)(void *context), void *context);
 
 // Moves the objects of the tree: as many boxes or triangles as it has, elsewhere. Boxes become
-// tight again, and nodes remain. The growth of the cost tells when a search is worth its time.
+// tight again round whole objects, and nodes remain. Bake triangles that move with `references` =
+// 1: every part of a divided triangle gets the box of the whole, even where nothing has moved, and
+// the cost may grow severalfold. The growth of the cost tells when a search is worth its time.
 // Arrays from `bvs_tree_nodes` and `bvs_tree_object_ids` become invalid. Tracers do not move.
 //
 // `tree` is a tree that no other thread uses; `objects` are objects whose arrays have the promised
@@ -312,14 +331,14 @@ BvsStatus bvs_tree_cost(const BvsTree *tree, uint32_t kind, double *cost);
 BvsStatus bvs_tree_frame(const BvsTree *tree, double *frame);
 
 // Returns the nodes of the tree, and writes their number to `count`. The nodes belong to the tree
-// and are valid until it is improved or freed. Their boxes lie in its frame, if it has one: see
-// `bvs_tree_frame`.
+// and are valid until it is improved, updated or freed. Their boxes lie in its frame, if it has
+// one: see `bvs_tree_frame`.
 //
 // `tree` is a tree; `count` points to a size.
 const BvsNode *bvs_tree_nodes(const BvsTree *tree, size_t *count);
 
 // Returns the object ids, to which leaves refer by position, and writes their number to `count`.
-// The ids belong to the tree and are valid until it is improved or freed.
+// The ids belong to the tree and are valid until it is improved, updated or freed.
 //
 // `tree` is a tree; `count` points to a size.
 const uint32_t *bvs_tree_object_ids(const BvsTree *tree, size_t *count);
@@ -371,8 +390,9 @@ void bvs_tree_free(BvsTree *tree);
 BvsTracer *bvs_tracer_new(const BvsTree *tree);
 
 // Moves the triangles of a tracer: as many as it has, elsewhere. Answers are those of a new
-// tracer, which takes much longer; rays become slower as neighbours part. Triangles with an area
-// still have one, and others none, or the call fails. Instances of the tracer remain as they are.
+// tracer, which takes about twice as long; rays become slower as neighbours part, and at once where
+// the tree divides triangles: bake with `references` = 1 what moves. Triangles with an area still
+// have one, and others none, or the call fails. Instances of the tracer remain as they are.
 //
 // `tracer` is a tracer that no other thread uses; `objects` are triangles whose arrays have the
 // promised lengths.
@@ -410,9 +430,10 @@ BvsStatus bvs_tracer_any_hits(const BvsTracer *tracer, const BvsRay *rays, size_
 BvsStatus bvs_tracer_surface_hits(const BvsTracer *tracer, const BvsRay *rays, size_t count, int32_t coherent, BvsSurfaceHit *hits);
 
 // Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of
-// each ray's hits to `counts`, and the number of all hits to `total`. Each crossing of the surface
-// counts once, although triangles share edges and corners. Only the first `capacity` hits are
-// written; if `total` is greater, call again with room for them.
+// each ray's hits to `counts`, and the number of all hits to `total`. Hits at the same distance
+// are in the order of their triangles. Each crossing of the surface counts once, although triangles
+// share edges and corners. Only the first `capacity` hits are written; if `total` is greater, call
+// again with room for them.
 //
 // `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to
 // `capacity` elements, and `total` points to a size.
@@ -427,7 +448,9 @@ BvsStatus bvs_tracer_closest_points(const BvsTracer *tracer, const float *points
 // Writes to `inside` whether each of `count` points, 3 floats each, is inside of the mesh: 1 or 0.
 // A mesh with holes has an inside, too: there the generalised winding number decides, at a hundred
 // times the cost, and near an open terrain, where it is nearly one half everywhere, at the cost of
-// most triangles. A point on the surface may count as either. The first call for a tracer examines all edges.
+// most triangles. A point on the surface of a mesh without holes counts as one a little below it in
+// x, far less above it in y, and again less in z: where meshes share faces, it is in one of them.
+// On other surfaces it may count as either. The first call for a tracer examines all edges.
 //
 // `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
 BvsStatus bvs_tracer_contains(const BvsTracer *tracer, const float *points, size_t count, uint8_t *inside);

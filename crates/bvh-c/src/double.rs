@@ -20,9 +20,13 @@ pub struct BvsTracerF64 {
 }
 
 /// The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any
-/// length except 0; `t_min` is 0 or more; `t_max` may be infinite. Coordinates are
-/// at most 2^120 in size, below 2^-150 they count as 0, and the largest component of a direction is
-/// from 2^-100 to 2^100.
+/// length except 0; `t_min` is 0 or more; `t_max` may be infinite. Coordinates are at most 2^120 in
+/// size, below 2^-150 they count as 0, and the largest component of a direction is from 2^-100 to
+/// 2^100.
+///
+/// A ray hits a triangle if they meet in real arithmetic at the origin or in front of it, and the
+/// real distance, rounded once, is from `t_min` to `t_max`. Edges and corners belong to a triangle:
+/// where triangles share them, a ray hits all.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct BvsRayF64 {
@@ -64,7 +68,7 @@ impl From<Option<DHit>> for BvsHitF64 {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BvsOrientation {
-    /// Either side.
+    /// Either side. A ray in the plane of a triangle never hits it, whatever the orientation.
     Any = 0,
     /// Along the normal, on whose side the corners run counterclockwise: the ray leaves a solid.
     Exiting = 1,
@@ -80,8 +84,12 @@ pub struct BvsSelect {
     pub orientation: u32,
     /// The number of ids in `excluded` for each ray.
     pub excluded_count: u32,
-    /// The indices of triangles that do not count, `excluded_count` for each ray; UINT32_MAX is
-    /// none.
+    /// The indices of triangles that do not count, `excluded_count` for each ray. Those that no
+    /// triangle has, such as UINT32_MAX, are ignored.
+    ///
+    /// A particle that flies on in its direction keeps its origin: `t_min` becomes the distance of
+    /// the last hit, and all triangles met at this distance are excluded, not only the last, because
+    /// an edge has several. A ray from the hit point, which is rounded, may miss the next triangle.
     pub excluded: *const u32,
 }
 

@@ -64,7 +64,8 @@ thread_local! {
 }
 
 /// Returns the message of the last failed call of this thread, or an empty string if none has
-/// failed. The string is valid until another call of this thread fails.
+/// failed. The string is valid until another call of this thread fails. Ask after the call that
+/// failed, in another statement: `printf("%d %s", f(), bvs_last_error())` may ask before.
 #[unsafe(no_mangle)]
 pub extern "C" fn bvs_last_error() -> *const c_char {
     LAST.with_borrow(|message| message.as_ptr())

@@ -397,11 +397,16 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         assert_eq!(hit, missing);
         bvs_tracer_f64_free(tracer);
         bvs_tracer_f64_free(null_mut());
-        let mut tiny = vertices.clone();
-        tiny[4 * 5 + 1] = 1e-300;
-        let objects = BvsObjects { vertices_f64: tiny.as_ptr(), ..objects };
+        let mut other = vertices.clone();
+        other[4 * 5 + 1] = -1e37;
+        let objects = BvsObjects { vertices_f64: other.as_ptr(), ..objects };
         let refused = bvs_tree_bake(&BvsBake { objects, ..NO_BAKE });
-        rejected(refused.is_null(), "triangle 1 has the corner [");
+        rejected(refused.is_null(), "vertex 5 of triangle 1 is [");
+        // What rounding leaves of 0 is 0.
+        other[4 * 5 + 1] = 2.4e-47;
+        let tree = bvs_tree_bake(&BvsBake { objects, ..NO_BAKE });
+        assert_eq!((*tree).owned.doubles().unwrap()[1].0[2].y, 0.0);
+        bvs_tree_free(tree);
         let single = self::tree(&[0.0; 9]);
         rejected(bvs_tracer_f64_new(single).is_null(), "vertices_f64");
         bvs_tree_free(single);
@@ -671,7 +676,8 @@ fn files_are_those_of_the_library_and_a_wrong_one_is_named() {
 
 #[test]
 fn invalid_arguments_are_rejected_by_name() {
-    let mut wrong = corners(5);
+    let right = corners(5);
+    let mut wrong = right.clone();
     let tree = tree(&wrong);
     wrong[9 * 3] = f32::NAN;
     let boxes = [0.0f32, 0.0, 0.0, 1.0, 1.0, 1.0];
@@ -680,12 +686,12 @@ fn invalid_arguments_are_rejected_by_name() {
     // and oversized arrays are rejected before.
     unsafe {
         for (corners, count, seconds, references, message) in [
-            (wrong.as_ptr(), 5, 0.0, 1.0, "3"),
+            (wrong.as_ptr(), 5, 0.0, 1.0, "vertex 9 of triangle 3 is [NaN, "),
             (null(), 5, 0.0, 1.0, "vertices is null"),
             (wrong.as_ptr().byte_add(1), 5, 0.0, 1.0, "vertices is not aligned to a multiple of 4"),
             (wrong.as_ptr(), usize::MAX, 0.0, 1.0, "more than memory has"),
-            (wrong.as_ptr(), 5, 0.0, f64::NAN, "references is NaN; accepted: 1 to 16"),
-            (wrong.as_ptr(), 5, -1.0, 1.0, "seconds is -1.0; accepted: 0 to 1e19"),
+            (right.as_ptr(), 5, 0.0, f64::NAN, "references is NaN; accepted: 1 to 16"),
+            (right.as_ptr(), 5, -1.0, 1.0, "seconds is -1.0; accepted: 0 to 1e19"),
             (wrong.as_ptr(), 0, f64::INFINITY, 1.0, "seconds is inf"),
         ] {
             let tree = bvs_tree_from_triangles(corners, count, seconds, references);
@@ -693,6 +699,9 @@ fn invalid_arguments_are_rejected_by_name() {
         }
         let timeless = bvs_tree_from_boxes(boxes.as_ptr(), 1, -1.0);
         rejected(timeless.is_null(), "seconds is -1.0; accepted: 0 to 1e19");
+        let inverted =
+            bvs_tree_from_boxes([[0.0f32; 6], [2.0, 0., 0., 1., 1., 1.]].as_ptr().cast(), 2, 0.0);
+        rejected(inverted.is_null(), "box 1, [2, 0, 0] to [1, 1, 1], has min above max");
         let boxed = bvs_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
         rejected(bvs_tracer_new(boxed).is_null(), "tree is over boxes");
         rejected(bvs_tree_load(null(), &BvsObjects::NONE).is_null(), "path is null");
@@ -718,7 +727,7 @@ fn invalid_arguments_are_rejected_by_name() {
             (BvsObjects { vertex_stride: 8, ..indexed }, "vertices has a stride of 8 bytes"),
             (BvsObjects { index_stride: 14, ..indexed }, "indices has a stride of 14 bytes"),
             (BvsObjects { index_stride: usize::MAX - 3, ..indexed }, "more than memory has"),
-            (BvsObjects { indices: null(), ..indexed }, "vertex_count is 15 without indices"),
+            (BvsObjects { indices: null(), ..indexed }, "accepted: 0, or 3 * count = 6"),
         ] {
             rejected(bvs_tree_bake(&BvsBake { objects, ..NO_BAKE }).is_null(), message);
             invalid(bvs_tree_update(tree, &BvsObjects { count: 5, ..objects }), "");
@@ -727,7 +736,7 @@ fn invalid_arguments_are_rejected_by_name() {
         invalid(bvs_tree_update(tree, &fewer), "objects are 4 triangles; accepted: 5 triangles");
         let boxes_now = BvsObjects { count: 5, boxes: wrong.as_ptr(), ..BvsObjects::NONE };
         invalid(bvs_tree_update(tree, &boxes_now), "objects are 5 boxes; accepted: 5 triangles");
-        invalid(bvs_tree_update(tree, &soup(&wrong)), "3");
+        invalid(bvs_tree_update(tree, &soup(&wrong)), "vertex 9 of triangle 3 is [NaN, ");
         let many = BvsBake { references: 17.0, work: 1, ..NO_BAKE };
         rejected(bvs_tree_bake(&many).is_null(), "references is 17; accepted: 1 to 16");
         rejected(bvs_tree_bake(null()).is_null(), "bake is null");
@@ -745,7 +754,7 @@ fn invalid_arguments_are_rejected_by_name() {
         invalid(bvs_any(null(), &up, null_mut()), "tracer is null");
         invalid(bvs_tracer_update(tracer, &fewer), "objects are 4 triangles; accepted: 5");
         let flat = [0.0; 45];
-        invalid(bvs_tracer_update(tracer, &soup(&flat)), "make the layout anew");
+        invalid(bvs_tracer_update(tracer, &soup(&flat)), "had an area, and is missing");
         let parts = [tracer.cast_const(), null()];
         let instance = BvsInstance { part: 0, transform: [0.0; 12] };
         let no_scene = bvs_instances_new(parts.as_ptr(), 2, &instance, 1, 0.0);

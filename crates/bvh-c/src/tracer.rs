@@ -123,8 +123,9 @@ pub unsafe extern "C" fn bvs_tracer_new(tree: *const BvsTree) -> *mut BvsTracer 
 }
 
 /// Moves the triangles of a tracer: as many as it has, elsewhere. Answers are those of a new
-/// tracer, which takes much longer; rays become slower as neighbours part. Triangles with an area
-/// still have one, and others none, or the call fails. Instances of the tracer remain as they are.
+/// tracer, which takes about twice as long; rays become slower as neighbours part, and at once where
+/// the tree divides triangles: bake with `references` = 1 what moves. Triangles with an area still
+/// have one, and others none, or the call fails. Instances of the tracer remain as they are.
 ///
 /// `tracer` is a tracer that no other thread uses; `objects` are triangles whose arrays have the
 /// promised lengths.
@@ -285,9 +286,10 @@ pub unsafe extern "C" fn bvs_tracer_surface_hits(
 }
 
 /// Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of
-/// each ray's hits to `counts`, and the number of all hits to `total`. Each crossing of the surface
-/// counts once, although triangles share edges and corners. Only the first `capacity` hits are
-/// written; if `total` is greater, call again with room for them.
+/// each ray's hits to `counts`, and the number of all hits to `total`. Hits at the same distance
+/// are in the order of their triangles. Each crossing of the surface counts once, although triangles
+/// share edges and corners. Only the first `capacity` hits are written; if `total` is greater, call
+/// again with room for them.
 ///
 /// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to
 /// `capacity` elements, and `total` points to a size.
@@ -361,7 +363,9 @@ pub unsafe extern "C" fn bvs_tracer_closest_points(
 /// Writes to `inside` whether each of `count` points, 3 floats each, is inside of the mesh: 1 or 0.
 /// A mesh with holes has an inside, too: there the generalised winding number decides, at a hundred
 /// times the cost, and near an open terrain, where it is nearly one half everywhere, at the cost of
-/// most triangles. A point on the surface may count as either. The first call for a tracer examines all edges.
+/// most triangles. A point on the surface of a mesh without holes counts as one a little below it in
+/// x, far less above it in y, and again less in z: where meshes share faces, it is in one of them.
+/// On other surfaces it may count as either. The first call for a tracer examines all edges.
 ///
 /// `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
 #[unsafe(no_mangle)]

@@ -6,15 +6,16 @@ use crate::failure::{
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::{FirstCountNode, Target};
 use bvh_search::bvh_core::glam::{DMat3, DVec3};
-use bvh_search::bvh_core::{DTriangle, Primitives};
+use bvh_search::bvh_core::{DRay, Primitives};
 use bvh_search::prelude::*;
 use bvh_search::{Anywhere, Frames, Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
+use std::fmt::Debug;
 use std::ptr::null;
 use std::sync::Arc;
 
 /// A tree with its objects. Any number of threads may read a tree at the same time. A thread that
-/// improves or frees it must be the only user.
+/// improves, updates or frees it must be the only user.
 pub struct BvsTree {
     /// Tracers share the tree until it is improved.
     pub(crate) owned: Arc<OwnedTree>,
@@ -48,7 +49,8 @@ pub enum BvsCost {
     InternalArea = 0,
     /// The cost of Goldsmith and Salmon.
     GoldsmithSalmon = 1,
-    /// The surface area heuristic with both constants 1.
+    /// The surface area heuristic with both constants 1, relative to the root's box: in a frame
+    /// that makes this box smaller it may rise, although the area falls.
     Sah = 2,
     /// The cost of the layout that `bvs_tracer_new` makes.
     Layout = 3,
@@ -97,18 +99,20 @@ pub unsafe extern "C" fn bvs_tree_from_triangles(
 }
 
 /// Boxes, or triangles between vertices. One of `boxes`, `vertices` and `vertices_f64` is given;
-/// other fields that are 0 or null have their defaults.
+/// other fields that are 0 or null have their defaults. Coordinates are finite numbers.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct BvsObjects {
-    /// The number of boxes or triangles.
+    /// The number of boxes or triangles. 0 is an empty scene, also where arrays are given: calls
+    /// succeed, and the tree is empty.
     pub count: usize,
     /// 6 floats for each of `count` boxes: the lower corner, then the upper corner.
     pub boxes: *const f32,
     /// 3 floats for each vertex.
     pub vertices: *const f32,
-    /// 3 doubles for each vertex, each 0 or from 2^-150 to 2^120 in size. Trees over them are
-    /// traced by `bvs_tracer_f64_new`. Their boxes lie in a frame with its centre in the middle.
+    /// 3 doubles for each vertex, at most 2^120 in size; below 2^-150 they count as 0. Trees over
+    /// them are traced by `bvs_tracer_f64_new`. Their boxes lie in a frame with its centre in the
+    /// middle.
     pub vertices_f64: *const f64,
     /// The number of vertices; without `indices` 0 is 3 * `count`.
     pub vertex_count: usize,
@@ -146,7 +150,8 @@ pub struct BvsBake {
     /// The number of rays; 0 for a tree for random lines.
     pub ray_count: usize,
     /// The average number of parts into which triangles may be divided among leaves, up to 16; 1 is
-    /// for whole triangles. 0 is 1 with `work` or `seconds`, and chosen without.
+    /// for whole triangles, as triangles that will move should be (see `bvs_tree_update`). 0 is 1
+    /// with `work` or `seconds`, and chosen without.
     pub references: f64,
     /// The time of the search in seconds; 0 is no limit. Without `seconds` and `work`, the search
     /// chooses its work, its cost and its rays, as Python and the program `bvh` do.
@@ -158,11 +163,15 @@ pub struct BvsBake {
     /// The seed of the random numbers, which is 1 by default in Python and in the program `bvh`.
     pub seed: u64,
     /// 1 lets the boxes of triangles lie in a frame where that saves area, as by default in Python
-    /// and in the program `bvh`: they are then no boxes for other tracers. 0 keeps the axes.
+    /// and in the program `bvh`: they are then no boxes for other tracers. The choice takes at most
+    /// a tenth of the budget. 0 keeps the axes.
     pub frame: u32,
 }
 
-/// Searches for the best tree with these choices.
+/// Searches for the best tree with these choices. Searches and other work on large trees run on as
+/// many threads as the environment variable RAYON_NUM_THREADS says when the first begins, by default
+/// on all processors. Calls that trace rays or look up points run on the thread that calls: several
+/// threads may pass parts of an array each.
 ///
 /// `bake` is a search whose arrays have the promised lengths.
 #[unsafe(no_mangle)]
@@ -253,7 +262,9 @@ impl Observer for Until {
 }
 
 /// Moves the objects of the tree: as many boxes or triangles as it has, elsewhere. Boxes become
-/// tight again, and nodes remain. The growth of the cost tells when a search is worth its time.
+/// tight again round whole objects, and nodes remain. Bake triangles that move with `references` =
+/// 1: every part of a divided triangle gets the box of the whole, even where nothing has moved, and
+/// the cost may grow severalfold. The growth of the cost tells when a search is worth its time.
 /// Arrays from `bvs_tree_nodes` and `bvs_tree_object_ids` become invalid. Tracers do not move.
 ///
 /// `tree` is a tree that no other thread uses; `objects` are objects whose arrays have the promised
@@ -323,8 +334,8 @@ pub unsafe extern "C" fn bvs_tree_frame(tree: *const BvsTree, frame: *mut f64) -
 }
 
 /// Returns the nodes of the tree, and writes their number to `count`. The nodes belong to the tree
-/// and are valid until it is improved or freed. Their boxes lie in its frame, if it has one: see
-/// `bvs_tree_frame`.
+/// and are valid until it is improved, updated or freed. Their boxes lie in its frame, if it has
+/// one: see `bvs_tree_frame`.
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
@@ -340,7 +351,7 @@ pub unsafe extern "C" fn bvs_tree_nodes(tree: *const BvsTree, count: *mut usize)
 }
 
 /// Returns the object ids, to which leaves refer by position, and writes their number to `count`.
-/// The ids belong to the tree and are valid until it is improved or freed.
+/// The ids belong to the tree and are valid until it is improved, updated or freed.
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
@@ -548,33 +559,40 @@ unsafe fn objects_of(objects: &BvsObjects) -> Result<Objects, Failure> {
     if !boxes.is_null() {
         // SAFETY: an `Aabb` is `repr(C)` with 6 floats, and `boxes` points to that many for each.
         let boxes = unsafe { slice("boxes", boxes.cast::<Aabb>(), count) }?;
+        for (index, aabb @ Aabb { min, max }) in boxes.iter().enumerate() {
+            aabb.check().map_err(|reason| {
+                let accepted = "accepted: finite numbers, the lower corner first";
+                Failure::invalid(format!("box {index}, {min} to {max}, {reason}; {accepted}"))
+            })?;
+        }
         return Ok(Objects::Boxes(boxes.to_vec()));
     }
     Ok(Objects::Shapes(if vertices_f64.is_null() {
         // SAFETY: what the caller promises.
-        Primitives::Triangles(unsafe { triangles_of("vertices", vertices, objects) }?)
+        let triangles = unsafe { triangles_of("vertices", vertices, f32::MAX.into(), objects) }?;
+        Primitives::Triangles(triangles)
     } else {
         // SAFETY: what the caller promises.
-        let triangles = unsafe { triangles_of("vertices_f64", vertices_f64, objects) }?;
-        DTriangle::check(&triangles).map_err(Failure::invalid)?;
+        let triangles = unsafe { triangles_of("vertices_f64", vertices_f64, DRay::MOST, objects) }?;
         Primitives::Doubles(triangles)
     }))
 }
 
-/// Copies triangles between vertices.
+/// Copies triangles between vertices, whose coordinates are at most `most` in size.
 ///
 /// # Safety
 /// `vertices` are those of `objects`, whose arrays have the promised lengths.
-unsafe fn triangles_of<N: Copy, T: From<[[N; 3]; 3]>>(
+unsafe fn triangles_of<N: Copy + Debug + Into<f64>, T: From<[[N; 3]; 3]>>(
     name: &str,
     vertices: *const N,
+    most: f64,
     objects: &BvsObjects,
 ) -> Result<Vec<T>, Failure> {
     let BvsObjects { count, vertex_count, vertex_stride, indices, index_stride, .. } = *objects;
     let corners = count.saturating_mul(3);
     if indices.is_null() && vertex_count != 0 && vertex_count != corners {
         return Err(Failure::invalid(format!(
-            "vertex_count is {vertex_count} without indices; accepted: {corners}, or 0"
+            "vertex_count is {vertex_count} without indices; accepted: 0, or 3 * count = {corners}"
         )));
     }
     let vertex_count = if indices.is_null() { corners } else { vertex_count };
@@ -594,6 +612,15 @@ unsafe fn triangles_of<N: Copy, T: From<[[N; 3]; 3]>>(
             let range = format!("vertex {missing} of {vertex_count}, counted from 0");
             return Err(Failure::invalid(format!("triangle {number} has {range}")));
         };
+        for (id, vertex) in ids.iter().zip([a, b, c]) {
+            // NaN fails every comparison.
+            if !vertex.iter().all(|&x| Into::<f64>::into(x).abs() <= most) {
+                let accepted = format!("accepted: numbers up to {most:e} in size");
+                return Err(Failure::invalid(format!(
+                    "vertex {id} of triangle {number} is {vertex:?}; {accepted}"
+                )));
+            }
+        }
         Ok(T::from([a, b, c]))
     };
     (0..count).map(triangle).collect()

@@ -2,7 +2,7 @@
 //!
 //! The definitions are those of [`exact`](crate::exact) with f64 for f32. Exactness needs room for
 //! products of three coordinates: every coordinate, and every component of a direction, is 0 or
-//! between 2⁻¹⁵⁰ and 2¹²⁰ in size. All values of the exact layer are then multiples of 2⁻⁶⁶⁰ below
+//! between 2⁻¹⁵⁰ and 2¹²⁰ in size; smaller ones count as 0. All values of the exact layer are then multiples of 2⁻⁶⁶⁰ below
 //! 2⁵⁰⁰.
 
 use crate::exact::{Line, Verdict, is_degenerate};
@@ -17,9 +17,10 @@ use glam::DVec3;
 pub struct DTriangle(pub [DVec3; 3]);
 
 impl From<[[f64; 3]; 3]> for DTriangle {
-    /// Makes a triangle from three corners.
+    /// Makes a triangle from three corners. Coordinates below 2⁻¹⁵⁰ count as 0, as those of a
+    /// [ray](DRay::new): they are what rounding leaves of 0. Equal corners remain equal.
     fn from(corners: [[f64; 3]; 3]) -> Self {
-        Self(corners.map(DVec3::from))
+        Self(corners.map(|corner| DRay::exact(corner.into())))
     }
 }
 
@@ -265,7 +266,8 @@ impl Corners for DTriangle {
 }
 
 impl DTriangle {
-    /// Rejects triangles beyond the range in which answers are exact.
+    /// Rejects triangles beyond the range in which answers are exact. [`From`] an array makes none
+    /// that is too small for it.
     pub fn check(triangles: &[Self]) -> Result<(), OutOfExactRange> {
         for (triangle, DTriangle(corners)) in triangles.iter().enumerate() {
             if let Some(&corner) = corners.iter().find(|corner| !is_exact(**corner)) {

@@ -32,7 +32,9 @@ pub enum InsideRule {
 
 /// What is needed to tell the inside of a mesh from its outside.
 ///
-/// A point on the surface may count as inside or outside. A point that is not finite is outside.
+/// A point on the surface of a mesh without holes counts as one a little below it in x, far less
+/// above it in y, and again less in z: where meshes share faces, it is in one of them. On other
+/// surfaces it may count as either. A point that is not finite is outside.
 ///
 /// ```
 /// use bvh_core::{Aabb, Bvh, InsideRule, Node, Solid, Triangle, WideBvh};

@@ -11,10 +11,14 @@ pub enum RefitError {
     #[error("triangle {0} has a corner that is not finite, or a box in the frame of the layout")]
     NotFinite(u32),
     /// The layout has a triangle that the new ones lack, or that has lost its area.
-    #[error("triangle {0} of the layout is missing or has lost its area: make the layout anew")]
+    #[error(
+        "triangle {0} had an area, and is missing or has none now: make the layout or tracer anew"
+    )]
     Lost(u32),
     /// A triangle has an area, and is not in the layout: it had none, or was not there.
-    #[error("triangle {0} has an area and is not in the layout: make the layout anew")]
+    #[error(
+        "triangle {0} has an area now, and had none or was missing: make the layout or tracer anew"
+    )]
     Gained(u32),
 }
 

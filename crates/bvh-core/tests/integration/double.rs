@@ -323,6 +323,8 @@ fn numbers_beyond_the_exact_range_are_rejected() {
     let up = DVec3::Z;
     let tiny = DRay::half_line([1.0, 1e-50, -5e-324], [1e-60, 0.0, 1.0]);
     assert_eq!(tiny, DRay::half_line(DVec3::X, up));
+    let tiny = DTriangle::from([[1.0, 2.4e-47, 0.0], [0.0, 1.0, -1e-60], [0.0, 5e-324, 1.0]]);
+    assert_eq!((tiny, DTriangle::check(&[tiny])), (DTriangle([DVec3::X, DVec3::Y, up]), Ok(())));
     for bad in [f64::NAN, f64::INFINITY, 1e40] {
         let vector = DVec3::new(1.0, bad, 0.0);
         assert!(matches!(DRay::half_line(vector, up), Err(OutOfExactRange::Origin(_))), "{bad}");

@@ -148,15 +148,20 @@ fn a_triangle_without_area_changes_no_inside() {
 }
 
 #[test]
-fn of_two_boxes_with_a_common_face_one_contains_each_point_of_it() {
-    let left = outward(grid_box(2));
-    let right = moved(&left, 2.0 * Vec3::X);
-    let points: Vec<Vec3> = (0..25)
-        .map(|i| Vec3::new(1.0, (i % 5) as f32 / 2.5 - 0.8, (i / 5) as f32 / 2.5 - 0.8))
-        .collect();
-    for rule in [Parity, Winding] {
-        let [left, right] = [&left, &right].map(|mesh| contains(mesh, 0, &points, rule));
-        assert!(left.iter().zip(right).all(|(&left, right)| left != right), "{rule:?}");
+fn of_eight_boxes_with_common_faces_one_contains_each_point_of_them() {
+    let middle = outward(grid_box(2));
+    let at = |i: u8, n: u8| Vec3::from([i % n, i / n % n, i / n / n].map(f32::from));
+    let points: Vec<Vec3> = (0..125).map(|i| 0.5 * at(i, 5) - 1.0).collect();
+    for number in 0..8 {
+        let center = 2.0 * at(number, 2) - 1.0;
+        let mesh = moved(&middle, center);
+        for rule in [Parity, Winding] {
+            // Faces, edges and corners at 0 belong to the box below in x, and above in y and z.
+            for (point, is_inside) in points.iter().zip(contains(&mesh, 0, &points, rule)) {
+                let above = [point.x > 0.0, point.y >= 0.0, point.z >= 0.0];
+                assert_eq!(is_inside, above == [0, 1, 2].map(|i| center[i] > 0.0), "{point}");
+            }
+        }
     }
 }
 

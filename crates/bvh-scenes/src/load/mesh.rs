@@ -60,7 +60,7 @@ impl FromFile for DTriangle {
     }
 
     fn of(corners: [DVec3; 3]) -> Self {
-        Self(corners)
+        corners.map(|corner| corner.to_array()).into()
     }
 
     fn is_degenerate(&self) -> bool {
