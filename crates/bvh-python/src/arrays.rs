@@ -50,6 +50,26 @@ impl<'py, T: Element> Array<'py, T> {
     }
 }
 
+/// Returns anything that numpy accepts as an array of its own numbers.
+pub fn given<'py>(
+    name: &str,
+    argument: &Bound<'py, PyAny>,
+    accepted: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = argument.py();
+    let numpy = py.import("numpy")?;
+    // `asanyarray` keeps masked arrays, whose masks a conversion would drop silently. It would read
+    // the numbers of a tensor that is no array one by one. Open3D refuses numpy's way to ask for
+    // DLPack in an error that prints all numbers.
+    let given = match argument {
+        tensor if tensor.hasattr("__array__")? => numpy.call_method1("asanyarray", (tensor,)),
+        tensor if tensor.hasattr("numpy")? => tensor.call_method0("numpy"),
+        tensor if tensor.hasattr("__dlpack__")? => numpy.call_method1("from_dlpack", (tensor,)),
+        other => numpy.call_method1("asanyarray", (other,)),
+    };
+    given.map_err(|error| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py))))
+}
+
 /// Converts anything that numpy accepts as an array, and checks its shape. An array that has the
 /// type and is in row order already is not copied.
 pub fn numbers<'py, T: Number>(
@@ -60,20 +80,12 @@ pub fn numbers<'py, T: Number>(
 ) -> PyResult<Array<'py, T>> {
     let py = argument.py();
     let numpy = py.import("numpy")?;
-    let no_array =
-        |error: PyErr| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py)));
-    // `asanyarray` keeps masked arrays, whose masks the conversion below would drop silently. It
-    // would read the numbers of a tensor that is no array one by one.
-    let given = match argument {
-        tensor if tensor.hasattr("__array__")? => numpy.call_method1("asanyarray", (tensor,)),
-        tensor if tensor.hasattr("__dlpack__")? => numpy.call_method1("from_dlpack", (tensor,)),
-        tensor if tensor.hasattr("numpy")? => tensor.call_method0("numpy"),
-        other => numpy.call_method1("asanyarray", (other,)),
-    };
-    let given = given.map_err(no_array)?;
+    let given = given(name, argument, accepted)?;
     check_elements(name, &numpy, &given, T::KINDS)?;
     // In row order, aligned, and no subclass.
-    let array = numpy.call_method1("require", (&given, T::DTYPE, "CAE")).map_err(no_array)?;
+    let array = numpy
+        .call_method1("require", (&given, T::DTYPE, "CAE"))
+        .map_err(|error| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py))))?;
     let converted: PyReadonlyArrayDyn<T> = array.extract()?;
     assert!(converted.is_c_contiguous(), "numpy converts to row order");
     if accepts(converted.shape()) {
@@ -149,8 +161,13 @@ pub struct MeshNames {
 /// The arguments of `Tree.from_mesh` and `Tree.update`.
 pub const MESH: MeshNames = MeshNames { vertices: "vertices", faces: "faces" };
 
-/// The vertices of each face.
-pub type Faces = Vec<[u32; 3]>;
+/// The faces of a mesh.
+pub struct Faces {
+    /// The vertices of each face.
+    pub corners: Vec<[u32; 3]>,
+    /// The number of vertices, of which faces may use only some.
+    pub vertices: usize,
+}
 
 /// Reads the vertices of a mesh, `(v, 3)`, and its faces, `(n, 3)`. Returns triangles and faces.
 pub fn mesh<N: Real>(
@@ -179,7 +196,7 @@ pub fn mesh<N: Real>(
     }
     let triangles =
         triangles_of(names, &vertices, &indices, |face, vertex| outside(face, i64::from(vertex)))?;
-    Ok((triangles, indices))
+    Ok((triangles, Faces { corners: indices, vertices: accepted }))
 }
 
 /// Reads a mesh as the objects of a tree, and its faces.
@@ -197,18 +214,21 @@ pub fn mesh_objects(
 /// Reads the vertices of a mesh with known faces.
 pub fn moved_mesh(
     vertices: &Bound<PyAny>,
-    faces: &[[u32; 3]],
+    faces: &Faces,
     precision: Precision,
 ) -> PyResult<Objects> {
     with_precision!(precision, N => {
         let vertices = positions::<N>(MESH, vertices)?;
-        let found = vertices.shape()[0];
-        // The faces are known to be right, so the vertices are too few.
-        let missing = |face: usize, vertex: u32| {
-            let accepted = format!("a row for vertex {vertex}, which face {face} names");
+        let (found, accepted) = (vertices.shape()[0], faces.vertices);
+        let other = || {
+            let accepted = format!("({accepted}, 3), as the tree's mesh");
             invalid(format!("{} has shape ({found}, 3); accepted: {accepted}", MESH.vertices))
         };
-        triangles_of(MESH, &vertices, faces, missing).map(N::shapes).map(Objects::Shapes)
+        if found != accepted {
+            return Err(other());
+        }
+        let triangles = triangles_of(MESH, &vertices, &faces.corners, |_, _| other());
+        triangles.map(N::shapes).map(Objects::Shapes)
     })
 }
 

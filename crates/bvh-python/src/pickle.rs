@@ -1,5 +1,6 @@
 //! The bytes in the pickle of a tree. A pickle may be forged, so every part is checked.
 
+use crate::arrays::Faces;
 use crate::elements::invalid;
 use crate::precision::Real;
 use crate::threads::detached;
@@ -8,15 +9,16 @@ use bvh_search::{Objects, OwnedTree};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-/// The arguments that restore a tree: the kind of objects, the objects, the file and the faces.
+/// The arguments that restore a tree: the kind of objects, the objects, the file, the faces and the
+/// number of vertices.
 pub type State<'py> =
-    (&'static str, Bound<'py, PyBytes>, Bound<'py, PyBytes>, Option<Bound<'py, PyBytes>>);
+    (&'static str, Bound<'py, PyBytes>, Bound<'py, PyBytes>, Option<Bound<'py, PyBytes>>, usize);
 
 /// Returns the parts of a tree and of its mesh.
 pub fn state<'py>(
     py: Python<'py>,
     owned: &OwnedTree,
-    faces: Option<&[[u32; 3]]>,
+    faces: Option<&Faces>,
 ) -> PyResult<State<'py>> {
     let bytes = |numbers: &[u8]| PyBytes::new(py, numbers);
     let tree = detached(py, || owned.save())?.map_err(invalid)?;
@@ -25,8 +27,9 @@ pub fn state<'py>(
         (_, Some(doubles)) => ("doubles", bytes(bytemuck::cast_slice(doubles))),
         _ => ("boxes", bytes(bytemuck::cast_slice(owned.boxes()))),
     };
-    let faces = faces.map(|faces| bytes(bytemuck::cast_slice(faces)));
-    Ok((shape, objects, bytes(&tree), faces))
+    let vertices = faces.map_or(0, |faces| faces.vertices);
+    let faces = faces.map(|faces| bytes(bytemuck::cast_slice(&faces.corners)));
+    Ok((shape, objects, bytes(&tree), faces, vertices))
 }
 
 /// Restores a tree.
@@ -50,15 +53,15 @@ pub fn tree(py: Python, shape: &str, objects: &[u8], tree: &[u8]) -> PyResult<Ow
 }
 
 /// Restores the faces of a mesh, whose triangles are the objects of the tree.
-pub fn faces(owned: &OwnedTree, faces: &[u8]) -> PyResult<Vec<[u32; 3]>> {
-    let faces: Vec<[u32; 3]> = numbers("faces", faces)?;
+pub fn faces(owned: &OwnedTree, faces: &[u8], vertices: usize) -> PyResult<Faces> {
+    let corners: Vec<[u32; 3]> = numbers("faces", faces)?;
     let is_mesh = owned.triangles().is_some() || owned.doubles().is_some();
     let accepted = if is_mesh { owned.objects() } else { 0 };
-    if faces.len() != accepted {
-        let found = faces.len();
+    let found = corners.len();
+    if found != accepted {
         return Err(invalid(format!("faces has {found} faces; accepted: {accepted}, as objects")));
     }
-    Ok(faces)
+    Ok(Faces { corners, vertices })
 }
 
 /// Reads numbers of a pickle, whose bytes may begin anywhere.

@@ -1,6 +1,6 @@
 //! Reads the arrays of rays and points, and which triangles count for each ray.
 
-use crate::arrays::{Array, numbers};
+use crate::arrays::{Array, given, numbers};
 use crate::elements::invalid;
 use crate::precision::{Point, Precision, Real};
 use bvh_search::bvh_core::glam::DVec3;
@@ -56,9 +56,10 @@ impl<'py> Vectors<'py> {
         accepted: &str,
         accepts: impl Fn(&[usize]) -> bool,
     ) -> PyResult<Self> {
-        match Precision::of(argument) {
-            Precision::Single => numbers(name, argument, accepted, accepts).map(Self::Single),
-            Precision::Double => numbers(name, argument, accepted, accepts).map(Self::Double),
+        let array = &given(name, argument, accepted)?;
+        match Precision::of(array) {
+            Precision::Single => numbers(name, array, accepted, accepts).map(Self::Single),
+            Precision::Double => numbers(name, array, accepted, accepts).map(Self::Double),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The functions that check the arrays of the class `RaycastingScene`.
 
-use crate::arrays::{MeshNames, mesh};
+use crate::arrays::{MeshNames, given, mesh};
 use crate::precision::{Precision, with_precision};
 use crate::rays::Vectors;
 use numpy::{IntoPyArray, PyArrayMethods};
@@ -16,8 +16,9 @@ pub fn corners<'py>(
     vertex_positions: &Bound<'py, PyAny>,
     triangle_indices: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    with_precision!(Precision::of(vertex_positions), N => {
-        let (triangles, _) = mesh::<N>(NAMES, vertex_positions, triangle_indices)?;
+    let vertices = given(NAMES.vertices, vertex_positions, "(v, 3)")?;
+    with_precision!(Precision::of(&vertices), N => {
+        let (triangles, _) = mesh::<N>(NAMES, &vertices, triangle_indices)?;
         let numbers: Vec<N> = bytemuck::cast_slice(&triangles).to_vec();
         let corners = numbers.into_pyarray(vertex_positions.py());
         Ok(corners.reshape([triangles.len(), 3, 3])?.into_any())

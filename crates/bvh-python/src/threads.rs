@@ -55,10 +55,11 @@ impl Follower {
         Self { progress, start: Instant::now() }
     }
 
-    /// Calls the function with the elapsed seconds and a state.
+    /// Calls the function with the elapsed seconds and a state, `None` if it is infinite.
     fn tell(&self, py: Python, state: f64) -> PyResult<()> {
         if let Some(progress) = &self.progress {
-            progress.call1(py, (self.start.elapsed().as_secs_f64(), state))?;
+            let known = state.is_finite().then_some(state);
+            progress.call1(py, (self.start.elapsed().as_secs_f64(), known))?;
         }
         Ok(())
     }

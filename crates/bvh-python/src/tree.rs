@@ -1,7 +1,7 @@
 //! The class `Tree`: trees over arrays, found, improved, measured, saved, loaded, and copied as
 //! nodes.
 
-use crate::arrays::{boxes, mesh_objects, moved_mesh, segments, triangles};
+use crate::arrays::{Faces, boxes, mesh_objects, moved_mesh, segments, triangles};
 use crate::elements::invalid;
 use crate::improver::Improver;
 use crate::pickle::{self, State};
@@ -13,6 +13,7 @@ use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::Target;
+use bvh_search::bvh_core::file::FileError;
 use bvh_search::{Anywhere, BakeError, Frames, Objects, Options, OwnedTree, SearchError};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
@@ -29,16 +30,19 @@ use std::sync::{Arc, PoisonError, RwLock, RwLockWriteGuard};
 /// its objects and its faces, but forgets the `rays`, the `seed` and the `references` of its
 /// search, as a file does: `improve` then minimises the cost for random lines.
 ///
-/// Searches have these arguments. They end after `seconds` or after `work` nodes created or visited.
-/// Without either, a search chooses its work, and what else is not given: `reasons` says why. With
-/// `work` and without `seconds`, the same `seed` gives the same tree on
+/// Searches have these arguments. They end after `seconds` or after `work` nodes created or
+/// visited, and minimise the cost `internal_area`, for `rays` the cost of a `Tracer`. Without
+/// either, a search chooses its work: up to a minute or so for large meshes, and longer for
+/// millions of objects. It also chooses what else is not given, by the tests that rays from
+/// anywhere need in a `Tracer`, so that `internal_area` may end higher than after a few `seconds`;
+/// `reasons` says why. With `work` and without `seconds`, the same `seed` gives the same tree on
 /// every machine, and the same file as `bvh bake`. `progress(seconds, cost)` is called about twenty
-/// times per second with the elapsed time and the lowest cost so far; if it raises an exception,
-/// the search ends. `rays` are recorded rays of the shape `(m, 2, 3)`, from their origins to their
-/// hits: the tree is then for rays like these. `references` above 1, up to 16, divides triangles
-/// among leaves, on average into that many parts each; 1 keeps them whole. With
-/// `precision="double"` the triangles have `float64` coordinates, each 0 or 2^-150 to 2^120 in size,
-/// and `Tracer` answers in `float64`.
+/// times per second with the elapsed time and the lowest cost so far, which is `None` until there
+/// is a tree; if it raises an exception, the search ends. `rays` are recorded rays of the shape
+/// `(m, 2, 3)`, from their origins to their hits: the tree is then for rays like these.
+/// `references` above 1, up to 16, divides triangles among leaves, on average into that many parts
+/// each; 1 keeps them whole. With `precision="double"` the triangles have `float64` coordinates,
+/// each 0 or 2^-150 to 2^120 in size, and `Tracer` answers in `float64`.
 ///
 /// >>> from bvh_search import Tree
 /// >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -52,8 +56,8 @@ pub struct Tree {
     /// the interpreter's lock locks this, and so does a thread that forks. No fork therefore copies
     /// a locked lock.
     owned: RwLock<Arc<OwnedTree>>,
-    /// The corners of the triangles of a mesh.
-    faces: Option<Arc<Vec<[u32; 3]>>>,
+    /// The triangles of a mesh.
+    faces: Option<Arc<Faces>>,
     /// Whether a thread improves or moves the tree.
     improver: Improver,
 }
@@ -85,6 +89,7 @@ impl Tree {
     /// Searches for the best tree over the triangles of a mesh: vertices, `(v, 3)`, and faces, `(n,
     /// 3)`, of three vertices each. `update` moves the vertices later. The boxes lie along other
     /// axes than the vertices' where that saves area, see `frame`; `frame="file"` keeps the axes.
+    /// Without `seconds` and `work`, large meshes take up to a minute or longer, see `Tree`.
     ///
     /// >>> mesh = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], work=100)
     #[staticmethod]
@@ -194,7 +199,11 @@ impl Tree {
         };
         let bytes = tree_file::read(&path).map_err(read_error)?;
         let loaded = detached(py, || OwnedTree::load(objects, &bytes))?;
-        let owned = loaded.map_err(|error| invalid_argument("path", error))?;
+        let owned = loaded.map_err(|error| match error {
+            FileError::Single => invalid_argument("path", format!("{error}, precision=\"single\"")),
+            FileError::Double => invalid_argument("path", format!("{error}, precision=\"double\"")),
+            _ => invalid_argument("path", error),
+        })?;
         Ok(Self { faces: corners, ..Self::new(owned) })
     }
 
@@ -256,9 +265,9 @@ impl Tree {
         raised
     }
 
-    /// Moves the vertices, `(v, 3)`, of a tree from `from_mesh` or `load`. The nodes remain and their boxes
-    /// become tight, in milliseconds; `improve` may find better nodes. Tracers of the tree do not
-    /// change.
+    /// Moves the vertices, `(v, 3)`, of a tree from `from_mesh` or `load`, which are as many as
+    /// before. The nodes remain and their boxes become tight, in milliseconds; `improve` may find
+    /// better nodes. Tracers of the tree do not change.
     ///
     /// >>> mesh.update([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
     fn update(&self, vertices: &Bound<PyAny>) -> PyResult<()> {
@@ -278,8 +287,9 @@ impl Tree {
         Ok(())
     }
 
-    /// Returns a cost of the tree: `internal_area`, which searches minimise, `goldsmith_salmon`,
-    /// `sah` with both constants 1, or `layout`, the cost of a `Tracer`.
+    /// Returns a cost of the tree for random lines: `internal_area`, which searches with `seconds`
+    /// or `work` and without `rays` minimise, `goldsmith_salmon`, `sah` with both constants 1, or
+    /// `layout`, the cost of a `Tracer`, which compares trees of all searches.
     ///
     /// >>> square.cost("sah") > 0
     /// True
@@ -314,7 +324,7 @@ impl Tree {
     /// What the search chose by itself, and why: one line each. A loaded tree has none.
     ///
     /// >>> square.reasons
-    /// ["frame: no other saves enough area; kept are the file's axes"]
+    /// ["frame: the budget is too small to try others; kept are the file's axes"]
     #[getter]
     fn reasons(&self) -> Vec<String> {
         self.owned().reasons().iter().map(ToString::to_string).collect()
@@ -365,9 +375,8 @@ impl Tree {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, State<'py>)> {
-        let faces = self.faces.as_ref().map(|faces| faces.as_slice());
         let restore = py.get_type::<Self>().getattr("_restore")?;
-        Ok((restore, pickle::state(py, &self.owned(), faces)?))
+        Ok((restore, pickle::state(py, &self.owned(), self.faces.as_deref())?))
     }
 
     #[staticmethod]
@@ -377,9 +386,10 @@ impl Tree {
         objects: &[u8],
         tree: &[u8],
         faces: Option<&[u8]>,
+        vertices: usize,
     ) -> PyResult<Self> {
         let owned = pickle::tree(py, shape, objects, tree)?;
-        let faces = faces.map(|faces| pickle::faces(&owned, faces)).transpose()?;
+        let faces = faces.map(|faces| pickle::faces(&owned, faces, vertices)).transpose()?;
         Ok(Self { faces: faces.map(Arc::new), ..Self::new(owned) })
     }
 

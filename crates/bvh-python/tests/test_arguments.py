@@ -74,7 +74,9 @@ def test_numbers_within_their_range_are_accepted():
         (lambda: Tree.from_mesh(CORNERS, [[0, 1, -1]]), "^faces: face 0 names vertex -1; accepted: indices below 3$"),
         (lambda: Tree.from_mesh(CORNERS, [[0, 1, 2**32]]), "^faces: face 0 names vertex 4294967296; accepted"),
         (lambda: Tree.from_mesh(NAN, FACE), r"^vertices: vertex 0 of face 0 is \[0.0, 0.0, NaN\]; accepted: finite"),
-        (lambda: mesh().update([[0, 0, 0]]), r"^vertices has shape \(1, 3\); accepted: a row for vertex 1, which face 0 names$"),
+        (lambda: mesh().update([[0, 0, 0]]), r"^vertices has shape \(1, 3\); accepted: \(3, 3\), as the tree's mesh$"),
+        (lambda: mesh().update([*CORNERS, [0, 0, 0]]), r"^vertices has shape \(4, 3\); accepted: \(3, 3\)"),
+        (lambda: pickle.loads(pickle.dumps(mesh())).update([*CORNERS, [0, 0, 0]]), r"^vertices has shape \(4, 3\)"),
         (lambda: mesh().update(NAN), r"^vertices: vertex 0 of face 0 is \[0.0, 0.0, NaN\]; accepted: finite numbers of float32, up to 3.4e38$"),
         (lambda: mesh().update([[0, 0]] * 3), r"^vertices has shape \(3, 2\); accepted: \(v, 3\)$"),
     ],
@@ -95,10 +97,12 @@ def test_a_refused_update_leaves_the_tree_as_it_was():
 
 
 def test_forged_pickles_are_refused():
-    restore, (shape, objects, file, faces) = mesh().__reduce__()
+    restore, (shape, objects, file, faces, count) = mesh().__reduce__()
     boxes = from_boxes(work=10).__reduce__()[1]
-    assert len(restore(shape, objects, file, faces)) == 1
-    assert len(restore(shape, objects, file, None)) == 1
+    assert len(restore(shape, objects, file, faces, count)) == 1
+    assert len(restore(shape, objects, file, None, 0)) == 1
+    with pytest.raises(ValueError, match="^vertices has shape"):
+        restore(shape, objects, file, faces, 1).update(CORNERS[:1])
     for state, message in [
         ((shape, objects, file, b""), "^faces has 0 faces; accepted: 1, as objects$"),
         ((shape, objects, file, 2 * faces), "^faces has 2 faces; accepted: 1, as objects$"),
@@ -110,7 +114,7 @@ def test_forged_pickles_are_refused():
         ((shape, objects, file[:-1], None), "^tree: "),
     ]:
         with pytest.raises(ValueError, match=message):
-            restore(*state)
+            restore(*state, count)
     assert len(pickle.loads(pickle.dumps(mesh()))) == 1
 
 

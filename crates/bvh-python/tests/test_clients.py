@@ -231,7 +231,7 @@ def test_a_loaded_tree_of_a_mesh_moves(tmp_path):
 @pytest.mark.parametrize("kind", ["f4", "f8"])
 def test_one_origin_or_direction_is_for_all_rays(precision, kind):
     tracer = Tracer(Tree.from_mesh(*box(), work=1000, precision=precision))
-    many = RANDOM.uniform(-0.9, 0.9, (3000, 3)).astype(kind)
+    many = np.random.default_rng(1).uniform(-0.9, 0.9, (3000, 3)).astype(kind)
     one = np.array([3, 0.1, 0.2], kind)
     for name in ("nearest", "any", "all", "counts"):
         ask = getattr(tracer, name)
@@ -254,8 +254,13 @@ def test_a_search_follows_seed_work_rays_and_progress():
         Tree.from_boxes(boxes, rays=np.where(np.arange(500)[:, None, None] == 3, np.nan, rays))
     calls = []
     tree = Tree.from_boxes(boxes, 0.5, progress=lambda *state: calls.append(state))
-    assert len(calls) > 2 and calls == sorted(calls, key=lambda call: (call[0], -call[1]))
+    assert len(calls) > 2 and calls == sorted(calls, key=lambda call: (call[0], -(call[1] or np.inf)))
     assert calls[-1][1] >= tree.cost() * (1 - 1e-9)
+    calls.clear()
+    # A greedy tree over so many takes longer than the time between two calls.
+    many = np.random.default_rng(1).uniform(0, 10, (400_000, 1, 3)) + [[0, 0, 0], [1, 1, 1]]
+    Tree.from_boxes(many, 0.1, progress=lambda *state: calls.append(state))
+    assert calls[0][1] is None and all(cost is None or 0 < cost < np.inf for _, cost in calls)
 
     def stop(seconds, cost):
         raise LookupError("enough")
@@ -301,8 +306,8 @@ class Tensor:
     def __init__(self, array):
         self.array = np.array(array)
 
-    def __dlpack__(self, **options):
-        return self.array.__dlpack__(**options)
+    def __dlpack__(self, stream=None):
+        raise AssertionError("numpy asks with max_version first, and the refusal prints all numbers")
 
     def __dlpack_device__(self):
         return self.array.__dlpack_device__()
@@ -344,6 +349,7 @@ def test_a_scene_takes_and_answers_open3ds_meshes_and_tensors():
             for key, array in arrays.items():
                 assert type(answers[key]) is Tensor and type(array.cpu().numpy()) is np.ndarray
                 assert isinstance(array, np.ndarray) and array.isfinite().all()
+                assert answers[key].numpy().dtype == array.dtype
                 np.testing.assert_array_equal(answers[key].numpy(), array)
     camera = RaycastingScene.create_rays_pinhole(Tensor(np.eye(3)), Tensor(np.eye(4)), 2, 3)
     assert type(camera) is Tensor and camera.numpy().shape == (3, 2, 6)
@@ -448,6 +454,15 @@ def test_the_stub_has_the_documentation_of_the_module():
         path.write_text("\n".join(lines) + "\n")
     else:
         assert stale == [], "UPDATE_STUB=1 writes the stub"
+
+
+@pytest.mark.parametrize("name", ["raycasting", "trimesh"])
+def test_signatures_name_their_types(name):
+    pytest.importorskip(name if name == "trimesh" else "numpy")
+    module = importlib.import_module(f"bvh_search.{name}")
+    for part in map(vars(module).get, module.__all__):
+        for function in filter(inspect.isfunction, vars(part).values()):
+            assert "Sequence" not in str(inspect.signature(function)), function
 
 
 def test_every_public_function_has_an_example_and_all_examples_run():

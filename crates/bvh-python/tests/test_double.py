@@ -166,8 +166,11 @@ def test_trees_are_kept_moved_and_copied_in_their_precision(tmp_path):
     tree.save(tmp_path / "box.bvh")
     loaded = Tree.load(tmp_path / "box.bvh", vertices=vertices, faces=faces, precision="double")
     loose = Tree.load(tmp_path / "box.bvh", triangles=vertices[faces], precision="double")
-    with pytest.raises(ValueError, match="path: "):
+    with pytest.raises(ValueError, match='path: .*precision="double"'):
         Tree.load(tmp_path / "box.bvh", vertices=vertices, faces=faces)
+    Tree.from_mesh(vertices, faces, work=1000).save(tmp_path / "single.bvh")
+    with pytest.raises(ValueError, match='path: .*precision="single"'):
+        Tree.load(tmp_path / "single.bvh", vertices=vertices, faces=faces, precision="double")
     ray = vertices.mean(axis=0), [1, 0.125, 0.25]
     expected = tracer_of(vertices, faces).nearest(*ray)
     assert expected[1][0] >= 0

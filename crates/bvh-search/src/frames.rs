@@ -36,10 +36,13 @@ const LEAST_GAIN: f64 = 0.01;
 const WORK_PER_MOVE: f64 = 64.0;
 /// The least and the most triangles of the first sample.
 const FIRST: [usize; 2] = [64, 4096];
+/// The least within little work. Its last sample of 128 triangles still tells a tenth of the area.
+const LEAST: usize = 8;
 /// By what each later sample is larger than the one before.
 const GROWTH: usize = 4;
 /// The neighbours in the file that the last sample keeps together, as they are in most scenes: the
-/// details that a small rotation spoils are lost where all around them is left out.
+/// details that a small rotation spoils are lost where all around them is left out. Fewer in small
+/// samples, which are to be from several parts, too.
 const RUN: usize = 256;
 /// The triangles whose price tells the time of others.
 const CLOCKED: usize = 1024;
@@ -97,11 +100,13 @@ pub struct Choice {
     /// The share of the triangles that lie along one direction and its perpendicular ones, weighted
     /// by the roots of their areas.
     pub agreeing: f64,
+    /// Whether the budget sufficed to try other axes.
+    pub sufficed: bool,
 }
 
 impl Choice {
     /// The axes of the file, without a reason.
-    pub const FILE: Self = Self { frame: None, gain: 0.0, agreeing: 0.0 };
+    pub const FILE: Self = Self { frame: None, gain: 0.0, agreeing: 0.0, sufficed: false };
 
     /// Chooses the frame for a search of triangles with this budget: the file's axes unless another
     /// frame certainly saves area. The choice takes at most a tenth of the work or of the time. It is
@@ -112,7 +117,7 @@ impl Choice {
         let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
         // Turned boxes could overflow. The search will reject what is no number.
         if farthest.is_nan() || farthest >= f32::MAX / 4.0 {
-            return Self::FILE;
+            return Self { sufficed: true, ..Self::FILE };
         }
         let began = observer.progress();
         let scene = Scene { triangles, centre: centre(&bounds), observer };
@@ -128,12 +133,13 @@ impl Choice {
             work = work.min(SHARE * (1.0 - began) / price);
         }
         // Within little work, only the heaviest direction is tried.
-        let affordable = [true, false].into_iter().find_map(|searches| {
+        let kinds = [(true, FIRST[0]), (false, LEAST)];
+        let affordable = kinds.into_iter().find_map(|(searches, least)| {
             let mut size = FIRST[1];
-            while scene.work(size, searches) > work {
+            while size > 0 && scene.work(size, searches) > work {
                 size = size * 7 / 8;
             }
-            (size >= FIRST[0].min(triangles.len())).then_some((size, searches))
+            (size >= least.min(triangles.len())).then_some((size, searches))
         });
         let choice = affordable.and_then(|(size, searches)| scene.choose(size, searches));
         choice.unwrap_or(Self::FILE)
@@ -193,13 +199,18 @@ impl Scene<'_> {
     fn work(&self, size: usize, searches: bool) -> f64 {
         let sample = |growth: usize| (growth * size).min(self.triangles.len());
         let search = (STARTS + 3 * KEPT * STEPS.len()) * sample(1) + KEPT * sample(GROWTH);
-        let rest = sample(ASKED) + if searches { search } else { 0 };
+        let rest = self.asked(size) + if searches { search } else { 0 };
         LAST * sample(GROWTH * GROWTH) as f64 + WORK_PER_OBJECT * rest as f64
+    }
+
+    /// Returns the size of the sample that tells directions, which costs little.
+    fn asked(&self, size: usize) -> usize {
+        (ASKED * size.max(FIRST[0])).min(self.triangles.len())
     }
 
     /// Chooses with a first sample of this size. `None` if the observer cancels.
     fn choose(&self, size: usize, searches: bool) -> Option<Choice> {
-        let asked = sample(self.triangles, (ASKED * size).min(MOST_ASKED), 1, 1);
+        let asked = sample(self.triangles, self.asked(size).min(MOST_ASKED), 1, 1);
         let told = directions(&asked);
         let agreeing = told.first().map_or(0.0, |(_, share)| *share);
         let heaviest = told.first().filter(|(_, share)| *share >= HEAVY);
@@ -213,9 +224,10 @@ impl Scene<'_> {
         let mut frames = vec![None];
         frames.extend(tried.into_iter().map(|rotation| self.frame(rotation)));
         if frames.len() == 1 {
-            return Some(Choice { agreeing, ..Choice::FILE });
+            return Some(Choice { agreeing, sufficed: true, ..Choice::FILE });
         }
-        let last = sample(self.triangles, size * GROWTH * GROWTH, RUN, 4);
+        let run = RUN.min(GROWTH * size);
+        let last = sample(self.triangles, size * GROWTH * GROWTH, run, 4);
         let is_whole = last.len() == self.triangles.len();
         let doubt = if is_whole { 0.0 } else { DOUBT / (last.len() as f64).sqrt() };
         let areas = parallel::map(frames.clone(), |frame| searched(&last, frame.as_ref()));
@@ -227,7 +239,7 @@ impl Scene<'_> {
             }
         }
         let gain = 1.0 - areas[best] / areas[0];
-        let choice = Choice { frame: frames[best], gain, agreeing };
+        let choice = Choice { frame: frames[best], gain, agreeing, sufficed: true };
         Some(if self.observer.cancelled() { Choice { agreeing, ..Choice::FILE } } else { choice })
     }
 

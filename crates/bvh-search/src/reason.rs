@@ -55,6 +55,9 @@ pub enum Tried {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
+            Self::Frame(Choice { sufficed: false, .. }) => f.write_str(
+                "frame: the budget is too small to try others; kept are the file's axes",
+            ),
             Self::Frame(Choice { frame: None, .. }) => {
                 f.write_str("frame: no other saves enough area; kept are the file's axes")
             }
@@ -133,7 +136,8 @@ mod tests {
         assert_eq!(work(More::Little(0.06)), little);
         let quarter = DMat3::from_rotation_y(0.5);
         let frame = Frame::new(quarter, DVec3::ZERO).ok();
-        let turned = Reason::Frame(Choice { frame, gain: 0.25, agreeing: 0.5 }).to_string();
+        let turned =
+            Reason::Frame(Choice { frame, gain: 0.25, agreeing: 0.5, sufficed: true }).to_string();
         assert_eq!(
             turned,
             "frame: turned by 29 degrees, 25 % less area than along the file's axes"

@@ -135,6 +135,12 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
     let start = Instant::now();
     let wide = args.layout(&scene, count * directions as u64)?;
     let seconds_to_build = start.elapsed().as_secs_f64();
+    let what = match (kind, &args.points) {
+        ("png", _) => "pixels",
+        (_, Some(_)) => "points",
+        _ if args.per == "vertex" => "vertices",
+        _ => "triangles",
+    };
     let points = made.unwrap_or_else(|| {
         let camera =
             Camera::new(&args.camera.view(&scene, axes.z_axis), axes.z_axis, width, height);
@@ -151,7 +157,7 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
     let mean = legend.of_points(&values).sum::<f64>() / count.max(1) as f64;
     let name = legend.name.replace('_', " ");
     answer.say(&format!(
-        "{}: mean {name} {} of {} points, {} directions, {} up; {} rays a second, {:.1} s in all",
+        "{}: mean {name} {} over {} {what}, {} directions, {} up; {} rays a second, {:.1} s in all",
         scene.name,
         short(mean),
         whole(count),
@@ -160,7 +166,10 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
         short(rays / seconds.max(f64::MIN_POSITIVE)),
         seconds_to_build + seconds
     ));
-    answer.say(&format!("{name}: {}", legend.line()));
+    answer.say(&format!(
+        "{name}: {}",
+        legend.line(kind, if args.sun.is_some() { " hours" } else { "" })
+    ));
     answer.say(&format!("{}", args.out.display()));
     let facts = [
         ("mean", mean),

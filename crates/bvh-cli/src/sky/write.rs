@@ -55,10 +55,13 @@ impl Legend {
         self.least.min(0.0)
     }
 
-    /// Describes the scale.
-    pub fn line(&self) -> String {
+    /// Describes the scale, in a unit, of this kind of file.
+    pub fn line(&self, kind: &str, unit: &str) -> String {
         let [first, least, most] = [self.first(), self.least, self.most].map(short);
-        format!("{least} to {most}; colours from black for {first} to pale yellow for {most}")
+        let bar = if kind == "png" { ", as along the lower edge," } else { "" };
+        format!(
+            "{least} to {most}{unit}; colours{bar} from black for {first} to pale yellow for {most}{unit}"
+        )
     }
 
     fn colour(&self, value: f64) -> [u8; 3] {

@@ -63,6 +63,9 @@ pub enum FileError {
     /// The tree is over triangles in f64, and the objects are others.
     #[error("the tree is over triangles in f64; accepted: the same triangles in double precision")]
     Double,
+    /// The tree is over triangles in f32, and the objects are triangles in f64 with other boxes.
+    #[error("the tree is over triangles in f32; accepted: the same triangles in single precision")]
+    Single,
     /// The tree lies in a frame, and boxes along the file's axes cannot validate it.
     #[error("the boxes of the tree lie in a frame: save it together with its triangles")]
     Frame,

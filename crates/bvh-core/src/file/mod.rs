@@ -308,12 +308,15 @@ impl<'a> TreeFile<'a> {
             Some(Primitives::Doubles(triangles)) => triangles,
             _ => return Err(FileError::Double),
         };
-        let objects = self.header.objects;
-        if boxes.len() != objects {
-            return Err(FileError::ObjectCount { found: boxes.len(), expected: objects });
+        let expected = self.header.objects;
+        if boxes.len() != expected {
+            return Err(FileError::ObjectCount { found: boxes.len(), expected });
         }
         let scene = scene_checksum(boxes, doubles);
         if scene != self.header.scene {
+            if let (false, Some(Primitives::Doubles(_))) = (self.header.is_double, objects) {
+                return Err(FileError::Single);
+            }
             return Err(FileError::OtherScene { found: scene, expected: self.header.scene });
         }
         Ok(self)

@@ -7,7 +7,7 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ._numbers import Numbers, Progress
+from ._numbers import Numbers, Progress, SearchProgress
 
 __all__ = ["Tracer", "Tree", "__version__", "corners", "rows", "sky"]
 
@@ -28,16 +28,19 @@ class Tree:
     its objects and its faces, but forgets the `rays`, the `seed` and the `references` of its
     search, as a file does: `improve` then minimises the cost for random lines.
 
-    Searches have these arguments. They end after `seconds` or after `work` nodes created or visited.
-    Without either, a search chooses its work, and what else is not given: `reasons` says why. With
-    `work` and without `seconds`, the same `seed` gives the same tree on
+    Searches have these arguments. They end after `seconds` or after `work` nodes created or
+    visited, and minimise the cost `internal_area`, for `rays` the cost of a `Tracer`. Without
+    either, a search chooses its work: up to a minute or so for large meshes, and longer for
+    millions of objects. It also chooses what else is not given, by the tests that rays from
+    anywhere need in a `Tracer`, so that `internal_area` may end higher than after a few `seconds`;
+    `reasons` says why. With `work` and without `seconds`, the same `seed` gives the same tree on
     every machine, and the same file as `bvh bake`. `progress(seconds, cost)` is called about twenty
-    times per second with the elapsed time and the lowest cost so far; if it raises an exception,
-    the search ends. `rays` are recorded rays of the shape `(m, 2, 3)`, from their origins to their
-    hits: the tree is then for rays like these. `references` above 1, up to 16, divides triangles
-    among leaves, on average into that many parts each; 1 keeps them whole. With
-    `precision="double"` the triangles have `float64` coordinates, each 0 or 2^-150 to 2^120 in size,
-    and `Tracer` answers in `float64`.
+    times per second with the elapsed time and the lowest cost so far, which is `None` until there
+    is a tree; if it raises an exception, the search ends. `rays` are recorded rays of the shape
+    `(m, 2, 3)`, from their origins to their hits: the tree is then for rays like these.
+    `references` above 1, up to 16, divides triangles among leaves, on average into that many parts
+    each; 1 keeps them whole. With `precision="double"` the triangles have `float64` coordinates,
+    each 0 or 2^-150 to 2^120 in size, and `Tracer` answers in `float64`.
 
     >>> from bvh_search import Tree
     >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -55,7 +58,7 @@ class Tree:
         references: float | None = None,
         seed: int = 1,
         work: int | None = None,
-        progress: Progress | None = None,
+        progress: SearchProgress | None = None,
         rays: Numbers | None = None,
         frame: Literal["auto", "file"] = "auto",
         precision: _Precision = "single",
@@ -63,6 +66,7 @@ class Tree:
         """Searches for the best tree over the triangles of a mesh: vertices, `(v, 3)`, and faces, `(n,
         3)`, of three vertices each. `update` moves the vertices later. The boxes lie along other
         axes than the vertices' where that saves area, see `frame`; `frame="file"` keeps the axes.
+        Without `seconds` and `work`, large meshes take up to a minute or longer, see `Tree`.
 
         >>> mesh = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], work=100)
         """
@@ -74,7 +78,7 @@ class Tree:
         references: float | None = None,
         seed: int = 1,
         work: int | None = None,
-        progress: Progress | None = None,
+        progress: SearchProgress | None = None,
         rays: Numbers | None = None,
         frame: Literal["auto", "file"] = "auto",
         precision: _Precision = "single",
@@ -90,7 +94,7 @@ class Tree:
         *,
         seed: int = 1,
         work: int | None = None,
-        progress: Progress | None = None,
+        progress: SearchProgress | None = None,
         rays: Numbers | None = None,
     ) -> Tree:
         """Searches for the best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first.
@@ -134,7 +138,7 @@ class Tree:
         [[0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0, 2]]
         """
     def improve(
-        self, seconds: float | None = None, *, work: int | None = None, progress: Progress | None = None
+        self, seconds: float | None = None, *, work: int | None = None, progress: SearchProgress | None = None
     ) -> None:
         """Improves the tree for about `seconds`, by default 1, or for `work`. Ctrl-C ends the search early, and the tree keeps its
         gains. Until the call returns, other threads see the old tree, and a second `improve` raises
@@ -143,17 +147,18 @@ class Tree:
         >>> square.improve(work=1000)
         """
     def update(self, vertices: Numbers) -> None:
-        """Moves the vertices, `(v, 3)`, of a tree from `from_mesh` or `load`. The nodes remain and their boxes
-        become tight, in milliseconds; `improve` may find better nodes. Tracers of the tree do not
-        change.
+        """Moves the vertices, `(v, 3)`, of a tree from `from_mesh` or `load`, which are as many as
+        before. The nodes remain and their boxes become tight, in milliseconds; `improve` may find
+        better nodes. Tracers of the tree do not change.
 
         >>> mesh.update([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
         """
     def cost(
         self, kind: Literal["internal_area", "goldsmith_salmon", "sah", "layout"] = "internal_area"
     ) -> float:
-        """Returns a cost of the tree: `internal_area`, which searches minimise, `goldsmith_salmon`,
-        `sah` with both constants 1, or `layout`, the cost of a `Tracer`.
+        """Returns a cost of the tree for random lines: `internal_area`, which searches with `seconds`
+        or `work` and without `rays` minimise, `goldsmith_salmon`, `sah` with both constants 1, or
+        `layout`, the cost of a `Tracer`, which compares trees of all searches.
 
         >>> square.cost("sah") > 0
         True
@@ -171,7 +176,7 @@ class Tree:
         """What the search chose by itself, and why: one line each. A loaded tree has none.
 
         >>> square.reasons
-        ["frame: no other saves enough area; kept are the file's axes"]
+        ["frame: the budget is too small to try others; kept are the file's axes"]
         """
     @property
     def frame(self) -> tuple[list[list[float]], list[float]] | None:

@@ -15,8 +15,10 @@ class Tensor(Protocol):
 
 # Numbers that are converted to an array.
 Numbers = ArrayLike | Tensor
-# Called with the elapsed seconds and a state.
+# Called with the elapsed seconds and the part that is answered.
 Progress = Callable[[float, float], object]
+# Called with the elapsed seconds and the cost of the best tree, if there is one.
+SearchProgress = Callable[[float, float | None], object]
 
 # The least size of a number but 0 in a tree with precision="double".
 _LEAST = 2.0**-150

@@ -1,5 +1,8 @@
 """A scene with the method names of Open3D's `RaycastingScene`."""
 
+# The names of types in signatures, for help().
+from __future__ import annotations
+
 from typing import Any, Literal
 
 import numpy as np
@@ -18,11 +21,11 @@ class Answer(np.ndarray[Any, np.dtype[Any]]):
         """Returns a plain array of the same memory."""
         return self.view(np.ndarray)
 
-    def cpu(self) -> "Answer":
+    def cpu(self) -> Answer:
         """Returns the array itself."""
         return self
 
-    def isfinite(self) -> "Answer":
+    def isfinite(self) -> Answer:
         """Returns which numbers are finite."""
         return np.isfinite(self).view(Answer)
 

@@ -8,6 +8,9 @@
 array([ True])
 """
 
+# The names of types in signatures, for help().
+from __future__ import annotations
+
 import gc
 from typing import Any, Protocol
 
@@ -177,8 +180,8 @@ class RayMeshIntersector:
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_made": None}
 
-    def __copy__(self) -> "RayMeshIntersector":
+    def __copy__(self) -> RayMeshIntersector:
         return RayMeshIntersector(self.mesh, self._scale_to_box, self._seconds)
 
-    def __deepcopy__(self, memo: Any) -> "RayMeshIntersector":
+    def __deepcopy__(self, memo: Any) -> RayMeshIntersector:
         return self.__copy__()

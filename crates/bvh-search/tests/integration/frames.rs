@@ -8,7 +8,7 @@ use bvh_search::bvh_core::glam::{DMat3, DVec3, EulerRot};
 use bvh_search::bvh_core::{
     DHit, DRay, DTriangle, DWideBvh, Frame, InFrame, Primitives, Select, validate_references,
 };
-use bvh_search::{Choice, Frames, Objects, Observer, Options, OwnedTree, prelude::*};
+use bvh_search::{Choice, Frames, Objects, Observer, Options, OwnedTree, Reason, prelude::*};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 fn triangles(scene: &str) -> Vec<Triangle> {
@@ -40,12 +40,15 @@ fn a_turned_building_costs_what_it_cost_along_its_own_walls() {
             [(1, 1.0, DVec3::ZERO), (2, 1e-30, DVec3::ZERO), (3, 1e30, DVec3::ZERO)]
         {
             let triangles = turned(&straight, number, scale, offset);
-            let choice = Choice::of(&triangles, work(30_000_000), &());
-            let frame = choice.frame.expect("a frame");
-            assert_eq!(frame.centre(), DVec3::ZERO);
-            let ratio = area(&triangles, Some(frame)) / (area(&straight, None) * scale * scale);
-            assert!(ratio < 1.03, "{scene}, {number}: {ratio}");
-            assert!((0.1..1.0).contains(&choice.gain) && choice.agreeing > 0.05, "{choice:?}");
+            // The last budget permits only samples of some hundred triangles.
+            for budget in [30_000_000, 2_000_000, 400_000] {
+                let choice = Choice::of(&triangles, work(budget), &());
+                let frame = choice.frame.expect("a frame");
+                assert_eq!(frame.centre(), DVec3::ZERO);
+                let ratio = area(&triangles, Some(frame)) / (area(&straight, None) * scale * scale);
+                assert!(ratio < 1.03, "{scene}, {number}, {budget}: {ratio}");
+                assert!((0.1..1.0).contains(&choice.gain) && choice.agreeing > 0.05, "{choice:?}");
+            }
         }
         let far = turned(&straight, 4, 100.0, DVec3::new(512_345.0, 5_412_345.0, 0.0));
         let frame = Choice::of(&far, work(30_000_000), &()).frame.expect("a frame");
@@ -69,11 +72,15 @@ fn the_choice_is_the_same_for_any_number_of_threads() {
 fn scenes_along_their_axes_and_budgets_of_nothing_keep_their_bytes() {
     let escher = triangles("escher");
     let oblique = turned(&escher, 1, 1.0, DVec3::ZERO);
-    for (triangles, most) in [(&escher, 300_000), (&escher, 5_000_000), (&oblique, 0)] {
+    for (triangles, most) in [(&escher, 400_000), (&escher, 5_000_000), (&oblique, 0)] {
         let [auto, file] = [Frames::Auto, Frames::File].map(|frame| {
             let options = Options { budget: work(most), frame, ..Options::default() };
             OwnedTree::find(shapes(triangles), &options, &()).unwrap().save().unwrap()
         });
+        // Only what the budget sufficed for was tried.
+        let choice = Choice::of(triangles, work(most), &());
+        assert_eq!(choice.sufficed, most > 0);
+        assert_eq!(Reason::Frame(choice).to_string().contains("budget"), most == 0);
         assert!(auto == file, "{most}");
     }
     let over = Deadline::after(Duration::ZERO);
