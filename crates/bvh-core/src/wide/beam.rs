@@ -333,6 +333,8 @@ struct Beam<'a, K: Instructions, O: Obstacles> {
     factors: [[K::Rays; 2]; 3],
     /// A bit for each ray that nothing has stopped.
     live: [u32; VECTORS],
+    /// A bit for each ray that enters the box of the leaf being visited, of the vectors that do.
+    entered: [u32; VECTORS],
     /// What was done, about in cycles.
     work: u64,
     /// Whether every ray is tested against the boxes of inner nodes, how many of those were, and
@@ -379,6 +381,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
                 points: [[none; 3]; VECTORS],
                 factors: [[none; 2]; 3],
                 live: [0; VECTORS],
+                entered: [0; VECTORS],
                 work: 0,
                 is_strict: true,
                 tested: 0,
@@ -430,7 +433,8 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
             let mut child = root;
             let mut vectors = u32::MAX >> (32 - self.group.count);
             if !child.is_node() {
-                self.visit_leaf(child.index(), &self.live.clone());
+                self.entered = self.live;
+                self.visit_leaf(child.index(), vectors);
                 return;
             }
             loop {
@@ -442,10 +446,9 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
                 while leaves != 0 {
                     let lane = leaves.trailing_zeros() as usize & 7;
                     leaves &= leaves - 1;
-                    let entering = entering.of(lane);
-                    let (rays, entered) = self.enter(node, lane, &intervals, entering);
+                    let entered = self.enter(node, lane, &intervals, entering.of(lane));
                     let leaf = node.children.get_unchecked(lane).index();
-                    if entered != 0 && self.visit_leaf(leaf, &rays) {
+                    if entered != 0 && self.visit_leaf(leaf, entered) {
                         return;
                     }
                 }
@@ -454,7 +457,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
                     inner &= inner - 1;
                     let mut entered = entering.of(lane);
                     if self.is_strict {
-                        (_, entered) = self.enter(node, lane, &intervals, entered);
+                        entered = self.enter(node, lane, &intervals, entered);
                         self.tested += 1;
                         self.pruned += u32::from(entered == 0);
                     }
@@ -501,8 +504,8 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
         (entering, any)
     }
 
-    /// Returns a bit for each live ray of some vectors that enters the box of a node's child, and
-    /// whether there are any.
+    /// Returns which of some vectors have live rays that enter the box of a node's child, and notes
+    /// these rays.
     #[inline(always)]
     unsafe fn enter(
         &mut self,
@@ -510,8 +513,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
         lane: usize,
         intervals: &Intervals<K>,
         mut vectors: u32,
-    ) -> ([u32; VECTORS], u32) {
-        let mut rays = [0; VECTORS];
+    ) -> u32 {
         let mut entered = 0;
         self.work += 20 * u64::from(vectors.count_ones());
         // SAFETY: the processor has the instructions; there are six planes of eight lanes.
@@ -531,23 +533,24 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
                     // `min` returns the second of a NaN and a number.
                     exit = ((far - origin) * far_factor).min(exit);
                 }
-                rays[vector] = entry.le(exit).bits() & self.live[vector];
-                entered |= u32::from(rays[vector] != 0) << vector;
+                let rays = entry.le(exit).bits() & self.live[vector];
+                self.entered[vector] = rays;
+                entered |= u32::from(rays != 0) << vector;
             }
         }
-        (rays, entered)
+        entered
     }
 
-    /// Tests the triangles of a leaf with the rays that enter it. Returns whether all rays are
-    /// stopped.
+    /// Tests the triangles of a leaf with the rays of some vectors that enter it. Returns whether all
+    /// rays are stopped.
     #[inline(always)]
-    unsafe fn visit_leaf(&mut self, mut index: usize, entered: &[u32; VECTORS]) -> bool {
+    unsafe fn visit_leaf(&mut self, mut index: usize, vectors: u32) -> bool {
         let wide = self.beams.obstacles.boxes();
         // SAFETY: a block that is not its leaf's last is followed by another.
         unsafe {
             loop {
                 let block = &*wide.blocks.as_ptr().add(index);
-                if self.visit(block, entered) {
+                if self.visit(block, vectors) {
                     return true;
                 }
                 if block.is_last() {
@@ -560,14 +563,17 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
 
     /// Tests the triangles of a block. Returns whether all rays are stopped.
     #[inline(always)]
-    unsafe fn visit(&mut self, block: &TriangleBlock, entered: &[u32; VECTORS]) -> bool {
+    unsafe fn visit(&mut self, block: &TriangleBlock, vectors: u32) -> bool {
         // SAFETY: the processor has the instructions.
         unsafe {
             let shadows = Shadows::new(self, block);
             self.work += 100;
             for lane in 0..block.len() {
-                for (vector, &entered) in entered.iter().enumerate().take(self.group.count) {
-                    let live = self.live[vector] & entered;
+                let mut left = vectors;
+                while left != 0 {
+                    let vector = left.trailing_zeros() as usize % VECTORS;
+                    left &= left - 1;
+                    let live = self.live[vector] & self.entered[vector];
                     if live == 0 {
                         continue;
                     }
