@@ -28,6 +28,10 @@ export class Tree {
     /**
      * Reads a tree that was saved for this very geometry, of which `toMeshBVH` may have reordered the index since, but no
      * `new MeshBVH`; rejects damaged bytes and other geometries.
+     *
+     * @example
+     * const bytes = await (await fetch('model.bvh')).arrayBuffer(); // of tree.save()
+     * mesh.geometry.boundsTree = (await Tree.load(bytes, mesh.geometry)).toMeshBVH(mesh.geometry);
      */
     static load(bytes: ArrayBufferLike | ArrayBufferView, geometry: BufferGeometry): Promise<Tree>;
     /** The tree as a file, which the program `bvh` and the interfaces of other languages read. */
@@ -54,13 +58,23 @@ export class Tree {
  *
  * Rejects a geometry without triangles, with an index beyond its vertices (`RangeError`), with coordinates that are not
  * finite (`RangeError`), with morph targets or skin weights, and anything else than a geometry (`TypeError`).
+ *
+ * @example
+ * const tree = await bake(mesh.geometry, { seconds: 5, onProgress: ({ fraction }) => { bar.value = fraction; } });
+ * mesh.geometry.boundsTree = tree.toMeshBVH(mesh.geometry);
  */
 export function bake(geometry: BufferGeometry, options?: BakeOptions & { orient?: false }): Promise<Tree>;
 
 /** Turns the mesh as `orient` does, which `seconds` and `work` do not count, and searches the best tree of its geometry. */
 export function bake(mesh: Mesh, options: BakeOptions & { orient: true }): Promise<Tree>;
 
-/** Searches as `bake` does in a worker, so that the page stays alive. `signal` ends it. */
+/**
+ * Searches as `bake` does in a worker, so that the page stays alive. `signal` ends it.
+ *
+ * @example
+ * const stop = new AbortController(); // stop.abort() ends the search, and the promise rejects
+ * const tree = await bakeInWorker(mesh.geometry, { seconds: 30, signal: stop.signal });
+ */
 export function bakeInWorker(
     geometry: BufferGeometry, options?: BakeOptions & { orient?: false; signal?: AbortSignal },
 ): Promise<Tree>;
@@ -81,6 +95,9 @@ export function bakeInWorker(mesh: Mesh, options: BakeOptions & { orient: true; 
  * mesh (`TypeError`); a geometry with a `boundsTree` or of two objects of the scene; a normal map in the geometry's axes; a
  * scale that is not the same along all axes, up to signs, unless `matrixAutoUpdate` is false; and the geometries that
  * `bake` rejects.
+ *
+ * @example
+ * const { turned, gain } = await orient(mesh); // then new MeshBVH(mesh.geometry), or bake(mesh.geometry)
  */
 export function orient(mesh: Mesh): Promise<{ turned: boolean; gain: number }>;
 
@@ -91,6 +108,9 @@ export function costOf(meshBVH: MeshBVH): Promise<number>;
  * Casts a ray by `meshBVH.raycastFirst` or, with `query`, by `meshBVH.raycast`, and counts the boxes of nodes and the
  * triangles that it tests. The counts are the same on every machine, and tell with your own rays which of two trees is
  * the better one.
+ *
+ * @example
+ * const { boxes, triangles } = countTests(mesh.geometry.boundsTree, ray); // in the mesh's own coordinates
  */
 export function countTests(meshBVH: MeshBVH, ray: Ray, options?: {
     side?: Side | Material | Material[];
