@@ -2,8 +2,8 @@
 //!
 //! The definitions are those of [`exact`](crate::exact) with f64 for f32. Exactness needs room for
 //! products of three coordinates: every coordinate, and every component of a direction, is 0 or
-//! between 2⁻¹⁵⁰ and 2¹²⁰ in size; smaller ones count as 0. All values of the exact layer are then multiples of 2⁻⁶⁶⁰ below
-//! 2⁵⁰⁰.
+//! between 2⁻¹⁵⁰ and 2¹²⁰ in size; smaller ones count as 0. All values of the exact layer are then
+//! multiples of 2⁻⁶⁶⁰ below 2⁵⁰⁰.
 
 use crate::exact::{Line, Verdict, is_degenerate};
 use crate::triangle::{normal_of, offset_from};
