@@ -199,8 +199,12 @@ pub(crate) trait DoubleLanes:
     /// both.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
 
-    /// The rounded products and their rounding errors.
-    fn two_product(self, other: Self) -> (Self, Self);
+    /// The rounded products and their rounding errors, where products are fused.
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        let product = self * other;
+        (product, self.mul_sub(other, product))
+    }
 
     /// Where `self < other`.
     fn lt(self, other: Self) -> Self::Mask;
