@@ -238,15 +238,6 @@ pub(crate) const fn pow2(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
-/// Returns the axis of the direction's largest component, the lowest on ties, without a branch that
-/// the processor could not predict.
-#[inline(always)]
-pub(crate) fn largest_axis(ray: &Ray) -> usize {
-    let [x, y, z] = ray.direction().abs().to_array();
-    let axis = usize::from(y > x);
-    if z > x.max(y) { 2 } else { axis }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

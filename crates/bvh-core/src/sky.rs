@@ -5,6 +5,7 @@
 //! direction together, as a beam.
 
 use crate::Traced;
+use crate::exact::largest_axis;
 use crate::wide::POINTS_OF_BEAM;
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use core::num::NonZeroU32;
@@ -89,8 +90,7 @@ pub fn neighbours<P: Copy + Into<DVec3>>(points: &[P]) -> Vec<u32> {
         let at = |&number: &u32| points[number as usize];
         let low = numbers.iter().map(at).fold(DVec3::INFINITY, DVec3::min);
         let high = numbers.iter().map(at).fold(DVec3::NEG_INFINITY, DVec3::max);
-        let size = high - low;
-        let axis = if size.z > size.x.max(size.y) { 2 } else { usize::from(size.y > size.x) };
+        let axis = largest_axis(high - low);
         // Beams begin at multiples of their size, and end between halves.
         let unit = if count > POINTS_OF_BEAM { POINTS_OF_BEAM } else { FEW };
         let middle = (count / 2).div_ceil(unit) * unit;

@@ -103,7 +103,7 @@ impl Triangle {
     /// assert_eq!(triangle.intersect(&PreparedRay::new(&ray), 9.0), Some(1.0 / 3.0));
     /// ```
     pub fn intersect(&self, prepared: &PreparedRay, t_max: f32) -> Option<f32> {
-        let t = prepared.line.crossing(prepared.ray.ends(), &self.0, false)?;
+        let t = prepared.line.crossing(&self.0, false)?;
         (prepared.ray.t_min() <= t && t <= t_max).then_some(t)
     }
 
@@ -123,7 +123,7 @@ impl Triangle {
     /// assert_eq!(Triangle::from([a, c, d]).crossing(&diagonal), None);
     /// ```
     pub fn crossing(&self, ray: &Ray) -> Option<f32> {
-        let t = ray.line().crossing(ray.ends(), &self.0, true)?;
+        let t = ray.line().crossing(&self.0, true)?;
         (ray.t_min() <= t && t <= ray.t_max()).then_some(t)
     }
 }

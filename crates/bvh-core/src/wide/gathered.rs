@@ -166,6 +166,6 @@ impl Decided {
 
 #[inline(always)]
 pub(super) fn hit_of(ray: &Ray, line: &Line, object: u32, triangle: &Triangle) -> Option<Hit> {
-    let t = line.crossing(ray.ends(), &triangle.0, true)?;
+    let t = line.crossing(&triangle.0, true)?;
     (ray.t_min() <= t && t <= ray.t_max()).then_some(Hit { t, object })
 }

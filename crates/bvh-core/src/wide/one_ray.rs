@@ -7,8 +7,7 @@ use super::lanes::{Aligned, Lanes, Mask};
 use super::layout::{Child, WideBvh};
 use super::pairs::{Crossings, Pairs};
 use super::triangles::TriangleBlock;
-use crate::exact::AXES;
-use crate::ray::largest_axis;
+use crate::exact::{AXES, largest_axis};
 use crate::{Hit, Ray};
 use core::mem::MaybeUninit;
 
@@ -300,7 +299,7 @@ impl<L: Lanes> LeafRay<L> {
         let origin = ray.origin().to_array();
         let direction = ray.direction().to_array();
         let reach = ray.reach(&wide.bounds) * wide.error_factor;
-        let axes = AXES[largest_axis(ray)];
+        let axes = AXES[largest_axis(ray.direction().into())];
         // SAFETY: the processor has the instructions.
         unsafe {
             let [x, y, z] = axes;
