@@ -203,15 +203,6 @@ impl WideBvh {
         }
     }
 
-    /// Returns a finite point as the distances of boxes are computed from it.
-    pub(crate) fn boxed_point(&self, point: Vec3) -> Vec3 {
-        self.framed.as_ref().map_or(point, |framed| {
-            let point = framed.frame.point(point.as_dvec3()).as_vec3();
-            // A point that is moved nearer is not farther from any box.
-            point.clamp(Vec3::MIN, Vec3::MAX)
-        })
-    }
-
     /// The ray as the portable kernel tests boxes with it.
     #[inline(always)]
     pub(crate) fn slabs(&self, ray: &Ray) -> Slabs {
