@@ -31,11 +31,15 @@ pub(crate) trait Rays: Copy {
     ///
     /// # Safety
     /// The processor has the instructions, and there are a ray per lane.
+    #[inline(always)]
     unsafe fn load<L: Lanes>(
         self,
         first: usize,
         frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>);
+    ) -> (RayLanes<L>, BoxLanes<L>) {
+        // SAFETY: the caller's, and no lane lacks a ray.
+        unsafe { self.load_up_to(first, first + L::N, frame) }
+    }
 
     /// Does the same; the last ray before `end` fills the lanes that have none.
     ///
@@ -63,14 +67,21 @@ impl Rays for &[Ray] {
     }
 
     #[inline(always)]
-    unsafe fn load<L: Lanes>(
+    unsafe fn load_up_to<L: Lanes>(
         self,
         first: usize,
+        end: usize,
         frame: Option<&Frame>,
     ) -> (RayLanes<L>, BoxLanes<L>) {
-        // SAFETY: there are a ray per lane; a ray is three vectors of four lanes.
+        // SAFETY: the rays exist, or the padding does; a ray is three vectors of four lanes.
         unsafe {
-            let rays = self.as_ptr().add(first);
+            let padded: [Ray; 16];
+            let rays = if first + L::N <= end {
+                self.as_ptr().add(first)
+            } else {
+                padded = core::array::from_fn(|i| self[(first + i).min(end - 1)]);
+                padded.as_ptr()
+            };
             let [ox, oy, oz, t_min] = transpose::<L>(rays, 0);
             let [dx, dy, dz, t_max] = transpose::<L>(rays, 1);
             let [ix, iy, iz, _] = transpose(rays, 2);
@@ -84,23 +95,6 @@ impl Rays for &[Ray] {
                 }
             };
             (RayLanes { origin, direction, t_min, t_max }, boxed)
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn load_up_to<L: Lanes>(
-        self,
-        first: usize,
-        end: usize,
-        frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>) {
-        // SAFETY: the rays exist, or the padding does.
-        unsafe {
-            if first + L::N <= end {
-                return self.load(first, frame);
-            }
-            let padded: [Ray; 16] = core::array::from_fn(|i| self[(first + i).min(end - 1)]);
-            (&padded[..]).load(0, frame)
         }
     }
 
