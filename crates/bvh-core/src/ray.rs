@@ -77,7 +77,7 @@ impl Ray {
         if !(is_finite & Self::DIRECTION_RANGE.contains(&longest) & is_range) {
             return Err(Self::why_not(origin, direction, t_min, t_max));
         }
-        Ok(Self::made(origin, direction, t_min, t_max))
+        Ok(Self::with_inverse(origin, direction, 1.0 / direction, t_min, t_max))
     }
 
     /// Makes a ray like [`new`](Self::new), without the checks, for callers who know that they
@@ -98,11 +98,7 @@ impl Ray {
         let is_finite = (origin.extend(0.0).abs().cmple(Vec4::MAX)
             & direction.extend(0.0).abs().cmple(Vec4::MAX))
         .all();
-        Self::made(origin, direction, t_min, if is_finite { t_max } else { -1.0 })
-    }
-
-    #[inline]
-    fn made(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Self {
+        let t_max = if is_finite { t_max } else { -1.0 };
         Self::with_inverse(origin, direction, 1.0 / direction, t_min, t_max)
     }
 

@@ -2,7 +2,7 @@
 
 use crate::aabb::{round_down, round_up};
 use crate::ray::pow2;
-use crate::{Aabb, Frame, Ray};
+use crate::{Aabb, Frame, Ray, frame};
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
 /// A ray prepared for tests against the boxes of one scene.
@@ -209,8 +209,7 @@ impl Ray {
 #[inline]
 pub(crate) fn near_region(bounds: &Aabb) -> Aabb {
     const HUGE: f32 = pow2(126);
-    let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-    if size >= HUGE {
+    if frame::size(bounds) >= HUGE {
         return Aabb::EMPTY;
     }
     let distance = 256.0 * (bounds.max - bounds.min).max_element();
