@@ -178,7 +178,6 @@ pub fn check_boxes(boxes: &[Aabb]) -> Result<(), InvalidBox> {
     Ok(())
 }
 
-/// Rounds each coordinate downwards.
 #[inline]
 pub(crate) fn round_down(point: DVec3) -> Vec3 {
     Vec3::from(point.to_array().map(|x| {
@@ -187,7 +186,6 @@ pub(crate) fn round_down(point: DVec3) -> Vec3 {
     }))
 }
 
-/// Rounds each coordinate upwards.
 #[inline]
 pub(crate) fn round_up(point: DVec3) -> Vec3 {
     -round_down(-point)

@@ -10,7 +10,6 @@ use std::borrow::Cow;
 struct Subtree {
     /// The cost, times the root's area.
     cost: f64,
-    /// The number of objects.
     objects: u32,
     is_leaf: bool,
 }

@@ -52,12 +52,8 @@ pub enum OutOfExactRange {
     #[error(
         "triangle {triangle} has the corner {corner}: accepted are coordinates that are 0 or from 2^-150 to 2^120"
     )]
-    Triangle {
-        /// The triangle.
-        triangle: usize,
-        /// The corner.
-        corner: DVec3,
-    },
+    #[allow(missing_docs)] // The message explains the fields.
+    Triangle { triangle: usize, corner: DVec3 },
 }
 
 /// Returns whether all coordinates are in the range in which answers are exact.
@@ -413,7 +409,6 @@ impl Query<'_> {
         is_nearer
     }
 
-    /// Returns whether hits of a triangle count.
     #[inline(never)]
     pub(crate) fn counts(&self, object: u32) -> bool {
         let DTriangle(corners) = &self.triangles[object as usize];

@@ -5,27 +5,14 @@ use glam::Vec3;
 
 /// The reason why arrays are rejected as a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages explain the fields.
 pub enum MeshError {
     /// A triangle refers to a position that does not exist.
     #[error("triangle {triangle} names position {index} of {positions}, counted from 0")]
-    Index {
-        /// The triangle.
-        triangle: usize,
-        /// The index found.
-        index: u32,
-        /// The number of positions.
-        positions: usize,
-    },
+    Index { triangle: usize, index: u32, positions: usize },
     /// A corner of a triangle has a NaN or infinite coordinate.
     #[error("position {index} of triangle {triangle} is {found}; accepted: finite coordinates")]
-    NotFinite {
-        /// The triangle.
-        triangle: usize,
-        /// The index of the position.
-        index: u32,
-        /// The position.
-        found: Vec3,
-    },
+    NotFinite { triangle: usize, index: u32, found: Vec3 },
     /// There are more triangles than a tree can hold.
     #[error("the mesh has {0} triangles; accepted: at most {MAX_OBJECTS}")]
     TooMany(usize),

@@ -44,12 +44,8 @@ pub enum InvalidRay {
     Direction(Vec3),
     /// The range is NaN or extends behind the origin.
     #[error("the ray's range {t_min}..={t_max} must not be NaN and must start at 0 or later")]
-    Range {
-        /// The smallest distance found.
-        t_min: f32,
-        /// The largest distance found.
-        t_max: f32,
-    },
+    #[allow(missing_docs)] // The message explains the fields.
+    Range { t_min: f32, t_max: f32 },
 }
 
 impl Ray {
@@ -182,7 +178,6 @@ impl Ray {
         self.direction.w
     }
 
-    /// Returns the origin and the direction.
     #[inline(always)]
     pub(crate) fn ends(&self) -> [Vec3; 2] {
         [self.origin(), self.direction()]

@@ -37,28 +37,19 @@ pub struct Sky {
 
 /// The reason why numbers are rejected as a sky.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages explain the fields.
 pub enum InvalidSky {
     /// A direction is not finite, or zero, tiny or huge.
     #[error(
         "direction {index} is {found}; accepted: finite, its largest component between 2^-100 and 2^100"
     )]
-    Direction {
-        /// The number of the direction, from 0.
-        index: usize,
-        /// The direction found.
-        found: DVec3,
-    },
+    Direction { index: usize, found: DVec3 },
     /// The range is NaN or extends behind the points.
     #[error("the range {0}..={1} must not be NaN and must start at 0 or later")]
     Range(f64, f64),
     /// There are not as many weights for each direction.
     #[error("there are {weights} weights for {directions} directions; accepted: as many for each")]
-    Weights {
-        /// The number of weights.
-        weights: usize,
-        /// The number of directions.
-        directions: usize,
-    },
+    Weights { weights: usize, directions: usize },
     /// A weight is NaN or infinite.
     #[error("weight {0} is {1}; accepted: finite numbers")]
     Weight(usize, f64),

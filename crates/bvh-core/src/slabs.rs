@@ -65,9 +65,8 @@ pub struct Slabs {
     far_ray: Option<FarRay>,
 }
 
-/// The factor of entries, 1 − 4u.
+/// The factors of entries and of exits, 1 − 4u and 1 + 4u.
 pub(crate) const NEAR: f32 = 1.0 - 4.0 * (f32::EPSILON / 2.0);
-/// The factor of exits, 1 + 4u.
 pub(crate) const FAR: f32 = 1.0 + 4.0 * (f32::EPSILON / 2.0);
 /// The factors in f64.
 pub(crate) const NEAR_DOUBLE: f64 = 1.0 - 8.0 * f64::EPSILON;

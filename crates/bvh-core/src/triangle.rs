@@ -11,7 +11,6 @@ use glam::{Affine3A, DVec3, Vec3};
 pub struct Triangle(pub [Vec3; 3]);
 
 impl From<[[f32; 3]; 3]> for Triangle {
-    /// Makes a triangle from three corners.
     fn from(corners: [[f32; 3]; 3]) -> Self {
         Self(corners.map(Vec3::from))
     }
@@ -39,7 +38,6 @@ impl Triangle {
         Aabb::around(self.0)
     }
 
-    /// Returns the triangle's area in world units squared.
     pub(crate) fn area(&self) -> f64 {
         let [a, b, c] = self.0.map(|corner| corner.as_dvec3());
         0.5 * (b - a).cross(c - a).length()

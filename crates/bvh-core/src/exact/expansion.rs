@@ -24,7 +24,6 @@ impl<const N: usize> Expansion<N> {
         Self { terms: [0.0; N], len: 0 }
     }
 
-    /// Returns `self` with room for more terms.
     pub(super) fn widened<const M: usize>(&self) -> Expansion<M> {
         let mut wide = Expansion::zero();
         wide.terms[..self.len].copy_from_slice(self.terms());

@@ -83,9 +83,9 @@ mod number;
 mod quotient;
 mod volumes;
 
+use glam::DVec3;
 pub(crate) use number::{Number, Point};
 pub(crate) use quotient::{NARROWER, Numbers, Twice, distance};
-use glam::DVec3;
 use volumes::Volumes;
 
 /// The axes of the shear, indexed by the axis of the direction's largest component.

@@ -7,7 +7,6 @@ pub(crate) trait Number: Copy + PartialEq + PartialOrd {
     /// Rounds to the nearest number, ties to even.
     fn rounded(x: f64) -> Self;
 
-    /// Returns the same number in f64.
     fn double(self) -> f64;
 
     fn next_up(self) -> Self;
@@ -68,6 +67,5 @@ number!(f64 DVec3);
 pub(crate) trait Point: Copy {
     type Number: Number;
 
-    /// Returns the coordinates in f64.
     fn double(self) -> [f64; 3];
 }

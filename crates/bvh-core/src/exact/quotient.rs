@@ -48,7 +48,6 @@ impl<D: Numbers> Twice<D> {
         Self(sum, (a - a_part) + (b - b_part))
     }
 
-    /// The exact difference of two numbers.
     #[inline(always)]
     pub(crate) fn difference(a: D, b: D) -> Self {
         let difference = a - b;

@@ -90,13 +90,11 @@ pub struct RayDensity {
 
 /// The place of a grid in the world.
 struct Grid {
-    /// The lower corner of the grid, in world units.
     low: DVec3,
     cells_per_unit: DVec3,
 }
 
 impl Grid {
-    /// Makes the grid of a scene with these bounds.
     fn new(bounds: &Aabb) -> Result<Self, DensityError> {
         let min = bounds.min.as_dvec3();
         let max = bounds.max.as_dvec3();

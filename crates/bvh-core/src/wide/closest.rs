@@ -108,8 +108,12 @@ impl WideBvh {
     /// # Panics
     /// Panics if `points` and `closest` are not equally many.
     pub fn closest_points(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
-        Surface { obstacles: self, frame: self.frame(), corners: &|_, triangle| triangle.corners() }
-            .closest_points(points, closest);
+        Surface {
+            obstacles: self,
+            frame: self.frame(),
+            corners: &|_, triangle| triangle.corners(),
+        }
+        .closest_points(points, closest);
     }
 }
 

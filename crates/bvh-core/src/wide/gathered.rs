@@ -7,7 +7,6 @@ use super::triangles::{TriangleBlock, three_by_three};
 use crate::exact::Line;
 use crate::{Hit, Ray, Triangle};
 
-/// The maximum number of pairs.
 const PAIRS: usize = TriangleBlock::LANES * Gathered::RAYS;
 
 /// A number of every pair.
@@ -47,7 +46,6 @@ impl Gathered {
         self.count = 0;
     }
 
-    /// Returns the number of a pair's ray, and the lane of its triangle.
     #[inline(always)]
     pub(crate) fn names(&self, pair: usize) -> (usize, usize) {
         let [ray, lane] = self.names[pair];

@@ -209,7 +209,6 @@ impl WideBvh {
         Slabs::in_frame(ray, self.frame(), self.root_box())
     }
 
-    /// The frame that the boxes lie in, if it is not the file's.
     #[inline(always)]
     pub(crate) fn frame(&self) -> Option<&Frame> {
         self.framed.as_ref().map(|framed| &framed.frame)

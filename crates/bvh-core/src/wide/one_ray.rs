@@ -37,11 +37,9 @@ pub(crate) trait Filter {
     /// Whether all hits do, so that any hit needs no distance.
     const ACCEPTS_ALL: bool;
 
-    /// Returns whether a hit counts.
     fn accepts(&mut self, hit: Hit) -> bool;
 }
 
-/// The filter that accepts all hits.
 pub(crate) struct All;
 
 impl Filter for All {

@@ -20,10 +20,8 @@ use crate::slabs::{FAR, NEAR};
 use core::mem::MaybeUninit;
 use glam::Vec3;
 
-/// The maximum number of rays in a packet.
 pub(crate) const RAYS: usize = 128;
 
-/// The maximum number of vectors in a packet.
 const VECTORS: usize = RAYS / 8;
 
 /// A packet of vectors of rays that [cohere](RayLanes::cohere), all of the same octant.
@@ -271,7 +269,6 @@ unsafe fn fetch<K: Instructions>(wide: &WideBvh, node: &WideNode, mut mask: u32)
     }
 }
 
-/// A packet to trace.
 struct Trace<'a, K: Instructions, F> {
     packet: &'a mut Packet<K>,
     wide: &'a WideBvh,

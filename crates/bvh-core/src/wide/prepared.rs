@@ -167,7 +167,6 @@ impl Prepared {
         [x, y, z, dx, dy, dz, self.x_slope, self.y_slope, self.reach, self.t_min]
     }
 
-    /// The axes of the shear.
     #[inline(always)]
     pub(crate) fn axes(&self) -> &'static [usize; 3] {
         // SAFETY: it is an axis.
