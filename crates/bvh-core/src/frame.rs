@@ -249,7 +249,7 @@ pub(crate) fn size(aabb: &Aabb) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Triangle;
+    use crate::{Corners, Triangle};
     use glam::DQuat;
     use num_rational::BigRational;
     use proptest::prelude::*;
@@ -266,7 +266,7 @@ mod tests {
             let rotation = DMat3::from_quat(DQuat::from_array(turn).normalize());
             let frame = Frame::new(rotation, DVec3::from(centre) * far).unwrap();
             let triangle = Triangle::from(corners.map(|x| x * size as f32));
-            let aabb = frame.aabb(&triangle);
+            let aabb = frame.aabb_of(triangle.corners());
             let exactly = |x: f64| BigRational::from_float(x).unwrap();
             for axis in 0..3 {
                 let along = frame.axes[axis];

@@ -127,16 +127,10 @@ impl Triangle {
 }
 
 impl Frame {
-    /// Returns the smallest box in the frame that certainly contains the triangle: it is rounded
-    /// outwards.
-    #[inline]
-    pub fn aabb(&self, triangle: &Triangle) -> Aabb {
-        self.aabb_of(triangle.0.map(Vec3::as_dvec3))
-    }
-
-    /// Returns the box of every triangle in the frame, in the same order.
-    pub fn boxes(&self, triangles: &[Triangle]) -> Vec<Aabb> {
-        triangles.iter().map(|triangle| self.aabb(triangle)).collect()
+    /// Returns the smallest box in the frame that certainly contains the triangle, rounded outwards,
+    /// of every triangle in the same order.
+    pub fn boxes<T: Corners>(&self, triangles: &[T]) -> Vec<Aabb> {
+        InFrame { triangles, frame: Some(self) }.boxes()
     }
 }
 
@@ -157,7 +151,7 @@ impl Corners for Triangle {
 
     #[inline]
     fn aabb_in(&self, frame: Option<&Frame>) -> Aabb {
-        frame.map_or_else(|| self.aabb(), |frame| frame.aabb(self))
+        frame.map_or_else(|| self.aabb(), |frame| frame.aabb_of(self.corners()))
     }
 }
 

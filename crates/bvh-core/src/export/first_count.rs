@@ -17,14 +17,11 @@ use bytemuck::{Pod, Zeroable};
 /// | 28..32 | `u32` | number of object ids of a leaf; 0 for an inner node |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
+#[allow(missing_docs)] // The table explains the fields.
 pub struct FirstCountNode {
-    /// Lower corner of the box.
     pub min: [f32; 3],
-    /// Index of the first of two adjacent children, or position of the leaf's first object id.
     pub first: u32,
-    /// Upper corner of the box.
     pub max: [f32; 3],
-    /// Number of object ids of a leaf; 0 for an inner node.
     pub count: u32,
 }
 
