@@ -179,10 +179,6 @@ mod tests {
         (above & below).all()
     }
 
-    fn scene(corners: [Vec3; 3]) -> Vec<Triangle> {
-        vec![Triangle(corners)]
-    }
-
     proptest! {
         #[test]
         fn a_part_holds_every_point_of_the_triangle_in_the_region(
@@ -190,17 +186,15 @@ mod tests {
             region in region(),
             weights in prop::array::uniform3(0.0f64..1.0),
         ) {
-            let triangles = scene(corners);
-            let part = triangles.as_slice().clip(0, &region);
-            let tight = triangles.as_slice().clip_tightly(0, &region);
-            prop_assert!(part.contains(&tight) && region.contains(&part));
-            prop_assert!(triangles[0].aabb().contains(&part));
+            let triangles = &[Triangle(corners)][..];
+            let full = triangles[0].aabb();
+            let [part, tight] = [triangles.clip(0, &region), triangles.clip_tightly(0, &region)];
+            prop_assert!(part.contains(&tight) && region.contains(&part) && full.contains(&part));
             let [a, b, c] = corners.map(Vec3::as_dvec3);
             let sum: f64 = weights.iter().sum();
             let mean = (a * weights[0] + b * weights[1] + c * weights[2]) / sum.max(1e-9);
             // The mean is off by rounding errors of the largest coordinate. A tight part allows
             // for such errors within the triangle's box, and no part leaves that box.
-            let full = triangles[0].aabb();
             let point = mean.clamp(full.min.as_dvec3(), full.max.as_dvec3());
             if is_inside(point, &region) {
                 prop_assert!(is_inside(point, &tight), "{point} in {tight:?}");
@@ -214,27 +208,27 @@ mod tests {
             cut in coordinate(),
             axis in 0usize..3,
         ) {
-            let triangles = scene(corners);
+            let triangles = &[Triangle(corners)][..];
             let mut inner = outer;
             inner.max[axis] = cut.clamp(outer.min[axis], outer.max[axis]);
-            let inner_part = triangles.as_slice().clip_tightly(0, &inner);
-            let outer_part = triangles.as_slice().clip(0, &outer);
+            let inner_part = triangles.clip_tightly(0, &inner);
+            let outer_part = triangles.clip(0, &outer);
             prop_assert!(outer_part.contains(&inner_part), "{inner_part:?} in {outer_part:?}");
         }
     }
 
     #[test]
     fn the_half_of_a_diagonal_is_a_quarter_of_its_box() {
-        let triangles = scene([Vec3::ZERO, Vec3::new(4.0, 4.0, 0.0), Vec3::new(4.0, 4.0, 1.0)]);
+        let triangles = &[Triangle::from([[0.0; 3], [4.0, 4.0, 0.0], [4.0, 4.0, 1.0]])][..];
         let half = Aabb::from([[0.0; 3], [2.0, 4.0, 1.0]]);
-        let part = triangles.as_slice().clip(0, &half);
+        let part = triangles.clip(0, &half);
         assert_eq!(part.min, Vec3::ZERO);
         assert_eq!(part.max.x, 2.0);
         assert!((part.max.y - 2.0).abs() < 1e-6, "{part:?}");
         assert!((part.max.z - 0.5).abs() < 1e-6, "{part:?}");
         // This region overlaps the triangle's box, but not the triangle.
         let missed = Aabb::from([[0.0, 3.0, 0.0], [1.0, 4.0, 1.0]]);
-        assert_eq!(triangles.as_slice().clip(0, &missed), Aabb::EMPTY);
+        assert_eq!(triangles.clip(0, &missed), Aabb::EMPTY);
     }
 
     #[test]

@@ -145,15 +145,14 @@ pub(crate) mod tests {
         Vec3::new(x, y, z) / 32.0
     }
 
-    fn triangle(i: u32, seed: u32) -> Triangle {
-        let corner = point(i, seed);
-        Triangle([corner, corner + Vec3::X, corner + Vec3::Y * (1 + i % 3) as f32])
-    }
-
     /// Makes small triangles at pseudo-random points, and a lopsided binary tree over them with one
     /// object per leaf.
     pub(crate) fn scene(n: u32, seed: u32) -> (Vec<Triangle>, Bvh) {
-        let triangles: Vec<Triangle> = (0..n).map(|i| triangle(i, seed)).collect();
+        let triangle = |i: u32| {
+            let corner = point(i, seed);
+            Triangle([corner, corner + Vec3::X, corner + Vec3::Y * (1 + i % 3) as f32])
+        };
+        let triangles: Vec<Triangle> = (0..n).map(triangle).collect();
         let mut tree = Bvh::new(vec![Node::leaf(Aabb::EMPTY, 0, n)], (0..n).collect());
         let mut node = 0;
         while node < tree.nodes.len() {

@@ -23,20 +23,19 @@ pub(crate) struct BoxLanes<L> {
     pub(crate) inverse: [L; 3],
 }
 
+/// Rays in both forms.
+pub(crate) type Loaded<L> = (RayLanes<L>, BoxLanes<L>);
+
 /// The rays of a batch, in f32 or in f64.
 pub(crate) trait Rays: Copy {
     fn count(self) -> usize;
 
-    /// Returns the rays from number `first` on, in both forms; `frame` is that of the boxes.
+    /// Returns the rays from number `first` on; `frame` is that of the boxes.
     ///
     /// # Safety
     /// The processor has the instructions, and there are a ray per lane.
     #[inline(always)]
-    unsafe fn load<L: Lanes>(
-        self,
-        first: usize,
-        frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>) {
+    unsafe fn load<L: Lanes>(self, first: usize, frame: Option<&Frame>) -> Loaded<L> {
         // SAFETY: the caller's, and no lane lacks a ray.
         unsafe { self.load_up_to(first, first + L::N, frame) }
     }
@@ -50,7 +49,7 @@ pub(crate) trait Rays: Copy {
         first: usize,
         end: usize,
         frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>);
+    ) -> Loaded<L>;
 
     /// Fetches the rays from number `first` on, as many as a vector's. They need not exist. While a
     /// packet is traced, the processor does not see that the rays of the next one follow.
@@ -72,7 +71,7 @@ impl Rays for &[Ray] {
         first: usize,
         end: usize,
         frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>) {
+    ) -> Loaded<L> {
         // SAFETY: the rays exist, or the padding does; a ray is three vectors of four lanes.
         unsafe {
             let padded: [Ray; 16];

@@ -58,22 +58,6 @@ impl Scene {
     }
 }
 
-fn rays(bounds: &Aabb, n: usize, random: &mut Random) -> Vec<Ray> {
-    let mut rays = Vec::new();
-    for i in 0..n {
-        let scale = if i % 3 == 0 { 3.0 } else { 1.0 };
-        let t_max = if i % 5 == 0 { 0.7 } else { f32::INFINITY };
-        let from = point_inside(bounds, random) * scale;
-        let to = point_inside(bounds, random);
-        rays.push(Ray::new(from, to - from, 0.0, t_max).unwrap());
-    }
-    rays
-}
-
-fn point_inside(bounds: &Aabb, random: &mut Random) -> Vec3 {
-    bounds.min + (bounds.max - bounds.min) * ((random.point() + 1.0) * 0.5)
-}
-
 fn transform(random: &mut Random) -> Affine3A {
     let turn = Quat::from_axis_angle(random.point().normalize(), random.unit() * 6.0);
     let scale = Vec3::splat(random.of(&[0.1, 1.0, 3.0])) * (random.point() * 0.4 + 1.0);
@@ -98,7 +82,12 @@ fn turned_scaled_and_sheared_instances_answer_as_the_flat_scene() {
     let mut hits = 0;
     // Rays that graze a surface may differ by rounding.
     let mut differences = 0;
-    for ray in rays(&flat_tree.root_aabb().unwrap(), 6000, &mut random) {
+    let Aabb { min, max } = flat_tree.root_aabb().unwrap();
+    for i in 0..6000 {
+        let [from, to] = [(); 2].map(|()| min + (max - min) * (random.point() * 0.5 + 0.5));
+        let from = if i % 3 == 0 { from * 3.0 } else { from };
+        let t_max = if i % 5 == 0 { 0.7 } else { f32::INFINITY };
+        let ray = Ray::new(from, to - from, 0.0, t_max).unwrap();
         let found = instances.nearest_hit(&ray);
         let expected = nearest_hit(&flat_tree, &flat, &ray);
         hits += usize::from(expected.is_some());
@@ -291,17 +280,14 @@ fn moved_and_replaced_instances_answer_as_a_new_scene_of_the_same_parts() {
         assert_eq!(moving.refit(&wrong), Err(no_part));
         assert!(moving.replace(&now.instances, Bvh::default()).is_err());
         let rays = rays_of_every_kind(&now.flat().0, &mut random);
+        let nearest: Vec<_> = rays.iter().map(|ray| expected.nearest_hit(ray)).collect();
         let mut hits = vec![InstanceHit { t: 0.0, instance: 0, triangle: 0 }; rays.len()];
         let mut any = vec![false; rays.len()];
         moving.nearest_hits(&rays, &mut hits);
         moving.any_hits(&rays, &mut any);
-        for ((ray, hit), any) in rays.iter().zip(hits).zip(any) {
-            let expected = expected.nearest_hit(ray);
-            assert_eq!(
-                (bits(Some(hit)), any),
-                (bits(expected.or(Some(InstanceHit::MISS))), expected.is_some())
-            );
-        }
+        assert!(any.into_iter().eq(nearest.iter().map(Option::is_some)));
+        let expected = nearest.into_iter().map(|hit| bits(hit.or(Some(InstanceHit::MISS))));
+        assert!(hits.into_iter().map(|hit| bits(Some(hit))).eq(expected));
     }
     for (part, kept) in parts.iter().zip(moving.parts()) {
         assert!(Arc::ptr_eq(part, kept));
