@@ -8,6 +8,21 @@ use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 #[repr(align(64))]
 pub(crate) struct Aligned<T>(pub(crate) T);
 
+/// Functions that are one expression each.
+macro_rules! functions {
+    ($(fn $name:ident($($parameters:tt)*) -> $result:ty = $value:expr;)*) => {$(
+        #[inline(always)]
+        fn $name($($parameters)*) -> $result {
+            #[allow(unused_unsafe)]
+            unsafe {
+                $value
+            }
+        }
+    )*};
+}
+#[allow(unused_imports)] // Some machines have no vector kernel.
+pub(crate) use functions;
+
 /// `N` numbers of f32, or of u32 where an operation says so.
 ///
 /// A value exists only where the processor has the instructions: what makes one out of nothing is

@@ -5,7 +5,7 @@
 
 #![allow(clippy::undocumented_unsafe_blocks)]
 
-use crate::wide::lanes::{DoubleLanes, Lanes, Mask};
+use crate::wide::lanes::{DoubleLanes, Lanes, Mask, functions};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 
@@ -17,19 +17,6 @@ macro_rules! operators {
             #[inline(always)]
             fn $function(self, other: Self) -> Self {
                 unsafe { Self($instruction(self.0, other.0)) }
-            }
-        }
-    )*};
-}
-
-/// Functions that are one expression each.
-macro_rules! functions {
-    ($(fn $name:ident($($parameters:tt)*) -> $result:ty = $value:expr;)*) => {$(
-        #[inline(always)]
-        fn $name($($parameters)*) -> $result {
-            #[allow(unused_unsafe)]
-            unsafe {
-                $value
             }
         }
     )*};
