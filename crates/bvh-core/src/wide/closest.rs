@@ -13,7 +13,7 @@ use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::ray::pow2;
 use crate::triangle::offset_from;
-use crate::{Aabb, Corners, Frame, Hit, Kernel, Triangle};
+use crate::{Aabb, Corners, DTriangle, Frame, Hit, Kernel};
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
 
@@ -108,12 +108,8 @@ impl WideBvh {
     /// # Panics
     /// Panics if `points` and `closest` are not equally many.
     pub fn closest_points(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
-        Surface {
-            obstacles: self,
-            frame: self.frame(),
-            corners: &|_, triangle| triangle.corners(),
-        }
-        .closest_points(points, closest);
+        let surface = Surface { obstacles: self, frame: self.frame(), doubles: None };
+        surface.closest_points(points, closest);
     }
 }
 
@@ -131,9 +127,9 @@ impl DWideBvh {
     /// # Panics
     /// Panics if `points` and `closest` are not equally many.
     pub fn closest_points(&self, points: &[DVec3], closest: &mut [Option<Closest>]) {
-        let corners = |object: u32, _: &Triangle| self.triangles[object as usize].0;
-        Surface { obstacles: self, frame: Some(&self.frame), corners: &corners }
-            .closest_points(points, closest);
+        let doubles = Some(&self.triangles[..]);
+        let surface = Surface { obstacles: self, frame: Some(&self.frame), doubles };
+        surface.closest_points(points, closest);
     }
 }
 
@@ -142,8 +138,8 @@ struct Surface<'a, O> {
     obstacles: &'a O,
     /// The frame of the boxes, if it is not the file's.
     frame: Option<&'a Frame>,
-    /// Returns the corners of a triangle of a block.
-    corners: &'a dyn Fn(u32, &Triangle) -> [DVec3; 3],
+    /// The triangles by id, if they are in f64.
+    doubles: Option<&'a [DTriangle]>,
 }
 
 impl<O: Obstacles> Surface<'_, O> {
@@ -190,7 +186,10 @@ impl<O: Obstacles> Surface<'_, O> {
         };
         let visit = |block: &TriangleBlock, limit: &mut Hit| {
             for (object, triangle) in block.triangles() {
-                let corners = (self.corners)(object, &triangle);
+                let corners = match self.doubles {
+                    None => triangle.corners(),
+                    Some(triangles) => triangles[object as usize].0,
+                };
                 nearest.offer(object, offset_from(target, corners));
             }
             limit.t = nearest.limit(scale);
