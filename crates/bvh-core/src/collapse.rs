@@ -18,9 +18,6 @@ struct Subtree {
 /// [`cost::sah`](crate::cost::sah) with the same constants. The result is the least costly tree
 /// that can be made in this way, and of several such trees the one with the fewest nodes. The nodes
 /// of the result are in depth-first order. O(nodes + objects).
-///
-/// # Panics
-/// May panic on a tree that [`validate`](crate::validate()) rejects.
 pub fn collapse_leaves(tree: &Bvh, constants: &SahConstants) -> Bvh {
     collapse_at_most(tree.into(), constants, u32::MAX)
 }

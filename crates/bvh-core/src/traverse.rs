@@ -88,9 +88,6 @@ pub fn any_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ra
 ///
 /// `tree` is a [`&Bvh`](crate::Bvh) or a view of one. `test(object, t_max)` returns the distance at
 /// which the ray hits the object if that distance is in `ray.t_min()..=t_max`.
-///
-/// # Panics
-/// May panic or not return for a tree that [`validate`](crate::validate()) rejects.
 #[inline]
 pub fn nearest_hit_by<'t>(
     tree: impl Into<BvhView<'t>>,
@@ -111,9 +108,6 @@ pub fn nearest_hit_by<'t>(
 ///
 /// `test(object)` returns whether the ray hits the object. Although any hit is enough, boxes are
 /// visited front to back: near objects fill more of the view and are more likely to be hit.
-///
-/// # Panics
-/// Under the same conditions as [`nearest_hit_by`].
 #[inline]
 pub fn any_hit_by<'t>(
     tree: impl Into<BvhView<'t>>,

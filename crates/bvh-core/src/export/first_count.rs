@@ -30,9 +30,6 @@ impl Bvh {
     /// nodes refer to the tree's [`prim_ids`](Bvh::prim_ids). A node with more than two children
     /// becomes several nodes, which halve the children in their order. Boxes lie in the tree's
     /// [frame](Bvh::frame). O(nodes).
-    ///
-    /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn to_first_count(&self) -> Vec<FirstCountNode> {
         first_count(&binary(self), 0)
     }
@@ -40,9 +37,6 @@ impl Bvh {
     /// Converts the tree like [`to_first_count`](Self::to_first_count), but with an unused node at
     /// index 1. Every pair of siblings then begins at an even index and shares a cache line, as in
     /// `tinybvh`.
-    ///
-    /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn to_first_count_aligned(&self) -> Vec<FirstCountNode> {
         first_count(&binary(self), 1)
     }

@@ -45,7 +45,7 @@ impl Bvh {
     ///
     /// # Panics
     /// Panics if a leaf has more than 65 535 objects; [`Target::fit`](super::Target::fit) divides
-    /// such leaves. May panic on a tree that [`validate`](crate::validate()) rejects.
+    /// such leaves.
     pub fn to_three_mesh(&self) -> Vec<ThreeMeshNode> {
         let tree = binary(self);
         let mut nodes: Vec<ThreeMeshNode> = Vec::with_capacity(tree.nodes.len());
