@@ -179,10 +179,7 @@ impl SahConstants {
 fn checked<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     let constant = serde::Deserialize::deserialize(deserializer)?;
     // Both constants have the same range.
-    match SahConstants::new(constant, constant) {
-        Ok(_) => Ok(constant),
-        Err(invalid) => Err(serde::de::Error::custom(invalid)),
-    }
+    SahConstants::new(constant, constant).map(|_| constant).map_err(serde::de::Error::custom)
 }
 
 impl Default for SahConstants {

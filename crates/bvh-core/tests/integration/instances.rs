@@ -18,15 +18,11 @@ struct Scene {
 }
 
 fn scene(triangles: Vec<Vec<Triangle>>, transforms: Vec<Affine3A>, random: &mut Random) -> Scene {
-    let mut parts = Vec::new();
-    for part in &triangles {
-        let tree = tree(&boxes(part), SHAPES[0], random);
-        parts.push(WideBvh::new(&tree, part).unwrap());
-    }
-    let mut instances = Vec::new();
-    for (index, transform) in transforms.into_iter().enumerate() {
-        instances.push(Instance { part: (index % parts.len()) as u32, transform });
-    }
+    let mut tree_of = |part: &Vec<Triangle>| tree(&boxes(part), SHAPES[0], random);
+    let parts = triangles.iter().map(|part| WideBvh::new(&tree_of(part), part).unwrap()).collect();
+    let numbers = (0..triangles.len() as u32).cycle();
+    let instances = numbers.zip(transforms);
+    let instances = instances.map(|(part, transform)| Instance { part, transform }).collect();
     Scene { triangles, parts, instances }
 }
 
@@ -113,11 +109,9 @@ fn transforms_without_rounding_give_the_distances_of_the_flat_scene_bit_by_bit()
     let mut random = Random(2);
     let quarter_turn = Mat3A::from_cols(Vec3A::Y, Vec3A::NEG_X, Vec3A::Z);
     let turns = [Mat3A::IDENTITY, quarter_turn * 2.0, -Mat3A::IDENTITY];
-    let mut transforms = Vec::new();
-    for i in 0..40 {
-        let shift = integer_point(30, &mut random);
-        transforms.push(Affine3A::from_mat3_translation(turns[i % 3].into(), shift));
-    }
+    let shift = |_| integer_point(30, &mut random);
+    let moved = |(turn, shift)| Affine3A::from_mat3_translation(Mat3::from(turn), shift);
+    let transforms = turns.into_iter().cycle().zip((0..40).map(shift)).map(moved).collect();
     let scene = scene(vec![grid_box(4), grid_box(2)], transforms, &mut random);
     let (flat, names) = scene.flat();
     let flat_tree = tree(&boxes(&flat), SHAPES[0], &mut random);
@@ -222,7 +216,7 @@ fn every_tree_and_every_kernel_answers_alike_and_filters_see_every_hit() {
 
 /// Returns a point whose coordinates are integers from 0 to `end` − 1.
 fn integer_point(end: usize, random: &mut Random) -> Vec3 {
-    Vec3::new(random.below(end) as f32, random.below(end) as f32, random.below(end) as f32)
+    Vec3::from([(); 3].map(|()| random.below(end) as f32))
 }
 
 #[test]
@@ -262,10 +256,8 @@ fn moved_and_replaced_instances_answer_as_a_new_scene_of_the_same_parts() {
     let parts: Vec<Arc<WideBvh>> = now.parts.iter().cloned().map(Arc::new).collect();
     let mut moving = Instances::new(parts.clone(), vec![], Bvh::default()).unwrap();
     for (frame, transforms) in places.into_iter().enumerate() {
-        now.instances = (0..)
-            .zip(transforms)
-            .map(|(i, transform)| Instance { part: i % 2, transform })
-            .collect();
+        let instance = |(i, transform): (u32, _)| Instance { part: i % 2, transform };
+        now.instances = (0..).zip(transforms).map(instance).collect();
         let expected = now.all(&mut random).remove(0);
         if frame == 1 {
             moving.refit(&now.instances).unwrap();
