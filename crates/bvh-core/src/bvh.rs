@@ -158,9 +158,6 @@ impl Bvh {
 
     /// Returns the number of edges from the root to the deepest leaf; 0 for a tree of at most one
     /// node. O(nodes) time and memory.
-    ///
-    /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn depth(&self) -> usize {
         // One pass from the front is enough, because children come after their parents.
         let mut depth = vec![0u32; self.nodes.len()];
@@ -194,8 +191,7 @@ impl Bvh {
     /// or after another library has padded the boxes. O(nodes + objects).
     ///
     /// # Panics
-    /// Panics if `boxes` has fewer entries than the tree has objects, and may panic on a tree that
-    /// [`validate`](crate::validate()) rejects.
+    /// Panics if `boxes` has fewer entries than the tree has objects.
     pub fn refit(&mut self, boxes: &[Aabb]) {
         // Children come after their parents, so a pass from the back meets them first.
         for index in (0..self.nodes.len()).rev() {

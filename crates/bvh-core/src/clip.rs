@@ -27,44 +27,34 @@ use smallvec::SmallVec;
 /// Objects whose parts have boxes.
 pub trait Clip: Debug + Sync {
     /// Returns a box around everything of the object that is in `region`, or [`Aabb::EMPTY`] if
-    /// nothing is. The returned box is inside `region` and inside the object's box. If `region` is
-    /// the object's box, the returned box equals it.
-    fn clip(&self, object: u32, region: &Aabb) -> Aabb;
+    /// nothing is; computed corners are moved outwards by `slack` bounds of their error, at least 1.
+    /// The returned box is inside `region` and inside the object's box. If `region` is the object's
+    /// box, the returned box equals it.
+    fn part(&self, object: u32, region: &Aabb, slack: f64) -> Aabb;
 
-    /// Returns such a box for validation. It is also inside the box that [`clip`](Self::clip)
-    /// returns for any region around this one. The parts that a builder made may therefore be a
-    /// little larger than the parts that validation finds, and are never smaller. The default is
-    /// correct if `clip` returns exact boxes.
+    /// Returns the [part](Self::part) for builders.
+    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
+        self.part(object, region, 4.0)
+    }
+
+    /// Returns the [part](Self::part) for validation. It is inside the box that
+    /// [`clip`](Self::clip) returns for any region around this one. The parts that a builder made
+    /// may therefore be a little larger than the parts that validation finds, and are never smaller.
     fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
-        self.clip(object, region)
+        self.part(object, region, 1.0)
     }
 }
 
 impl Clip for &[Triangle] {
     #[inline]
-    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
-        InFrame { triangles: self, frame: None }.clip(object, region)
-    }
-
-    fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
-        InFrame { triangles: self, frame: None }.clip_tightly(object, region)
-    }
-}
-
-impl<T: Corners> Clip for InFrame<'_, T> {
-    #[inline]
-    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
-        clip(self, object, region, BUILDERS)
-    }
-
-    fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
-        clip(self, object, region, VALIDATION)
+    fn part(&self, object: u32, region: &Aabb, slack: f64) -> Aabb {
+        InFrame { triangles: self, frame: None }.part(object, region, slack)
     }
 }
 
 /// The part of a sphere is the intersection of its box with the region: cheap and exact.
 impl Clip for &[Sphere] {
-    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
+    fn part(&self, object: u32, region: &Aabb, _: f64) -> Aabb {
         self[object as usize].aabb().intersection(region)
     }
 }
@@ -83,35 +73,16 @@ impl Primitives {
 }
 
 impl Clip for Primitives {
-    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
-        part(self, object, region, BUILDERS)
-    }
-
-    fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
-        part(self, object, region, VALIDATION)
+    fn part(&self, object: u32, region: &Aabb, slack: f64) -> Aabb {
+        let frame = None;
+        match self {
+            Self::Triangles(triangles) => InFrame { triangles, frame }.part(object, region, slack),
+            Self::Doubles(triangles) => InFrame { triangles, frame }.part(object, region, slack),
+            Self::Spheres(spheres) => spheres.as_slice().part(object, region, slack),
+        }
     }
 }
 
-fn part(objects: &Primitives, object: u32, region: &Aabb, slack: f64) -> Aabb {
-    let frame = None;
-    match objects {
-        Primitives::Triangles(triangles) => {
-            clip(&InFrame { triangles, frame }, object, region, slack)
-        }
-        Primitives::Doubles(triangles) => {
-            clip(&InFrame { triangles, frame }, object, region, slack)
-        }
-        Primitives::Spheres(spheres) => spheres.as_slice().clip(object, region),
-    }
-}
-
-/// By how many error bounds builders widen a triangle's part: more than validation does.
-const BUILDERS: f64 = 4.0;
-/// By how many error bounds validation widens a triangle's part.
-const VALIDATION: f64 = 1.0;
-
-/// Returns the box around a triangle's part in a region.
-///
 /// The planes of the region cut the triangle in f64 (Sutherland & Hodgman 1974). A cut makes
 /// corners that are off by a few rounding errors, and a later cut may drop geometry within that
 /// error: an edge along a plane would be lost completely. The planes are therefore moved outwards
@@ -119,38 +90,40 @@ const VALIDATION: f64 = 1.0;
 /// result is rounded outwards to f32 and never leaves the region. The bound is relative to the
 /// triangle's largest coordinate: 2⁻⁴⁶ of it, 64 rounding errors, while each of the six cuts makes
 /// at most 5, and a frame at most 4 · 3 where it makes the corners.
-#[inline]
-fn clip<T: Corners>(objects: &InFrame<T>, object: u32, region: &Aabb, slack: f64) -> Aabb {
-    let triangle = &objects.triangles[object as usize];
-    let full = triangle.aabb_in(objects.frame);
-    let common = full.intersection(region);
-    // Most triangles are inside the region or outside of it, and need no cut.
-    if common == full || common == Aabb::EMPTY {
-        return common;
-    }
-    let farthest = full.min.abs().max(full.max.abs());
-    let largest = farthest.max_element();
-    let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
-    let low = region.min.as_dvec3() - error;
-    let high = region.max.as_dvec3() + error;
-    let corners = triangle.corners();
-    let corners = objects.frame.map_or(corners, |frame| corners.map(|corner| frame.point(corner)));
-    let mut kept = Polygon::from_slice(&corners);
-    for axis in 0..3 {
-        // Planes that miss the triangle cut nothing off.
-        if full.min[axis] < region.min[axis] {
-            kept = cut(&kept, axis, low[axis], 1.0);
+impl<T: Corners> Clip for InFrame<'_, T> {
+    #[inline]
+    fn part(&self, object: u32, region: &Aabb, slack: f64) -> Aabb {
+        let triangle = &self.triangles[object as usize];
+        let full = triangle.aabb_in(self.frame);
+        let common = full.intersection(region);
+        // Most triangles are inside the region or outside of it, and need no cut.
+        if common == full || common == Aabb::EMPTY {
+            return common;
         }
-        if full.max[axis] > region.max[axis] {
-            kept = cut(&kept, axis, high[axis], -1.0);
+        let farthest = full.min.abs().max(full.max.abs());
+        let largest = farthest.max_element();
+        let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
+        let low = region.min.as_dvec3() - error;
+        let high = region.max.as_dvec3() + error;
+        let corners = triangle.corners();
+        let corners = self.frame.map_or(corners, |frame| corners.map(|corner| frame.point(corner)));
+        let mut kept = Polygon::from_slice(&corners);
+        for axis in 0..3 {
+            // Planes that miss the triangle cut nothing off.
+            if full.min[axis] < region.min[axis] {
+                kept = cut(&kept, axis, low[axis], 1.0);
+            }
+            if full.max[axis] > region.max[axis] {
+                kept = cut(&kept, axis, high[axis], -1.0);
+            }
         }
+        if kept.is_empty() {
+            return Aabb::EMPTY;
+        }
+        let min = kept.iter().fold(DVec3::INFINITY, |min, corner| min.min(*corner)) - error;
+        let max = kept.iter().fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner)) + error;
+        Aabb { min: round_down(min), max: round_up(max) }.intersection(&common)
     }
-    if kept.is_empty() {
-        return Aabb::EMPTY;
-    }
-    let min = kept.iter().fold(DVec3::INFINITY, |min, corner| min.min(*corner)) - error;
-    let max = kept.iter().fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner)) + error;
-    Aabb { min: round_down(min), max: round_up(max) }.intersection(&common)
 }
 
 /// The corners of a convex planar polygon: a triangle cut by up to six planes, of which each adds at
@@ -206,10 +179,6 @@ mod tests {
         (above & below).all()
     }
 
-    fn scene(corners: [Vec3; 3]) -> Vec<Triangle> {
-        vec![Triangle(corners)]
-    }
-
     proptest! {
         #[test]
         fn a_part_holds_every_point_of_the_triangle_in_the_region(
@@ -217,17 +186,15 @@ mod tests {
             region in region(),
             weights in prop::array::uniform3(0.0f64..1.0),
         ) {
-            let triangles = scene(corners);
-            let part = triangles.as_slice().clip(0, &region);
-            let tight = triangles.as_slice().clip_tightly(0, &region);
-            prop_assert!(part.contains(&tight) && region.contains(&part));
-            prop_assert!(triangles[0].aabb().contains(&part));
+            let triangles = &[Triangle(corners)][..];
+            let full = triangles[0].aabb();
+            let [part, tight] = [triangles.clip(0, &region), triangles.clip_tightly(0, &region)];
+            prop_assert!(part.contains(&tight) && region.contains(&part) && full.contains(&part));
             let [a, b, c] = corners.map(Vec3::as_dvec3);
             let sum: f64 = weights.iter().sum();
             let mean = (a * weights[0] + b * weights[1] + c * weights[2]) / sum.max(1e-9);
             // The mean is off by rounding errors of the largest coordinate. A tight part allows
             // for such errors within the triangle's box, and no part leaves that box.
-            let full = triangles[0].aabb();
             let point = mean.clamp(full.min.as_dvec3(), full.max.as_dvec3());
             if is_inside(point, &region) {
                 prop_assert!(is_inside(point, &tight), "{point} in {tight:?}");
@@ -241,27 +208,27 @@ mod tests {
             cut in coordinate(),
             axis in 0usize..3,
         ) {
-            let triangles = scene(corners);
+            let triangles = &[Triangle(corners)][..];
             let mut inner = outer;
             inner.max[axis] = cut.clamp(outer.min[axis], outer.max[axis]);
-            let inner_part = triangles.as_slice().clip_tightly(0, &inner);
-            let outer_part = triangles.as_slice().clip(0, &outer);
+            let inner_part = triangles.clip_tightly(0, &inner);
+            let outer_part = triangles.clip(0, &outer);
             prop_assert!(outer_part.contains(&inner_part), "{inner_part:?} in {outer_part:?}");
         }
     }
 
     #[test]
     fn the_half_of_a_diagonal_is_a_quarter_of_its_box() {
-        let triangles = scene([Vec3::ZERO, Vec3::new(4.0, 4.0, 0.0), Vec3::new(4.0, 4.0, 1.0)]);
+        let triangles = &[Triangle::from([[0.0; 3], [4.0, 4.0, 0.0], [4.0, 4.0, 1.0]])][..];
         let half = Aabb::from([[0.0; 3], [2.0, 4.0, 1.0]]);
-        let part = triangles.as_slice().clip(0, &half);
+        let part = triangles.clip(0, &half);
         assert_eq!(part.min, Vec3::ZERO);
         assert_eq!(part.max.x, 2.0);
         assert!((part.max.y - 2.0).abs() < 1e-6, "{part:?}");
         assert!((part.max.z - 0.5).abs() < 1e-6, "{part:?}");
         // This region overlaps the triangle's box, but not the triangle.
         let missed = Aabb::from([[0.0, 3.0, 0.0], [1.0, 4.0, 1.0]]);
-        assert_eq!(triangles.as_slice().clip(0, &missed), Aabb::EMPTY);
+        assert_eq!(triangles.clip(0, &missed), Aabb::EMPTY);
     }
 
     #[test]

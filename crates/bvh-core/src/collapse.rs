@@ -10,7 +10,6 @@ use std::borrow::Cow;
 struct Subtree {
     /// The cost, times the root's area.
     cost: f64,
-    /// The number of objects.
     objects: u32,
     is_leaf: bool,
 }
@@ -19,9 +18,6 @@ struct Subtree {
 /// [`cost::sah`](crate::cost::sah) with the same constants. The result is the least costly tree
 /// that can be made in this way, and of several such trees the one with the fewest nodes. The nodes
 /// of the result are in depth-first order. O(nodes + objects).
-///
-/// # Panics
-/// May panic on a tree that [`validate`](crate::validate()) rejects.
 pub fn collapse_leaves(tree: &Bvh, constants: &SahConstants) -> Bvh {
     collapse_at_most(tree.into(), constants, u32::MAX)
 }
@@ -146,15 +142,14 @@ pub(crate) mod tests {
         Vec3::new(x, y, z) / 32.0
     }
 
-    fn triangle(i: u32, seed: u32) -> Triangle {
-        let corner = point(i, seed);
-        Triangle([corner, corner + Vec3::X, corner + Vec3::Y * (1 + i % 3) as f32])
-    }
-
     /// Makes small triangles at pseudo-random points, and a lopsided binary tree over them with one
     /// object per leaf.
     pub(crate) fn scene(n: u32, seed: u32) -> (Vec<Triangle>, Bvh) {
-        let triangles: Vec<Triangle> = (0..n).map(|i| triangle(i, seed)).collect();
+        let triangle = |i: u32| {
+            let corner = point(i, seed);
+            Triangle([corner, corner + Vec3::X, corner + Vec3::Y * (1 + i % 3) as f32])
+        };
+        let triangles: Vec<Triangle> = (0..n).map(triangle).collect();
         let mut tree = Bvh::new(vec![Node::leaf(Aabb::EMPTY, 0, n)], (0..n).collect());
         let mut node = 0;
         while node < tree.nodes.len() {

@@ -179,10 +179,7 @@ impl SahConstants {
 fn checked<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     let constant = serde::Deserialize::deserialize(deserializer)?;
     // Both constants have the same range.
-    match SahConstants::new(constant, constant) {
-        Ok(_) => Ok(constant),
-        Err(invalid) => Err(serde::de::Error::custom(invalid)),
-    }
+    SahConstants::new(constant, constant).map(|_| constant).map_err(serde::de::Error::custom)
 }
 
 impl Default for SahConstants {
@@ -231,11 +228,7 @@ pub fn sah(tree: &Bvh, constants: &SahConstants) -> f64 {
 
 #[inline]
 fn sum_over(tree: &Bvh, term: impl Fn(&Node) -> f64) -> f64 {
-    let mut sum = Sum::default();
-    for node in &tree.nodes {
-        sum.add(term(node));
-    }
-    sum.value()
+    tree.nodes.iter().map(term).collect::<Sum>().value()
 }
 
 /// Returns `area` divided by the half area of the root's box; 0 if the root's area is 0 or the tree
@@ -278,11 +271,10 @@ impl Sum {
 }
 
 impl FromIterator<f64> for Sum {
+    #[inline]
     fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Self {
         let mut sum = Self::default();
-        for term in terms {
-            sum.add(term);
-        }
+        terms.into_iter().for_each(|term| sum.add(term));
         sum
     }
 }

@@ -5,6 +5,7 @@
 //! between 2⁻¹⁵⁰ and 2¹²⁰ in size; smaller ones count as 0. All values of the exact layer are then
 //! multiples of 2⁻⁶⁶⁰ below 2⁵⁰⁰.
 
+pub(crate) use crate::exact::largest_axis;
 use crate::exact::{Line, Verdict, is_degenerate};
 use crate::triangle::{normal_of, offset_from};
 use crate::{Aabb, Corners, Frame, Hit, Ray, Triangle};
@@ -51,26 +52,13 @@ pub enum OutOfExactRange {
     #[error(
         "triangle {triangle} has the corner {corner}: accepted are coordinates that are 0 or from 2^-150 to 2^120"
     )]
-    Triangle {
-        /// The triangle.
-        triangle: usize,
-        /// The corner.
-        corner: DVec3,
-    },
+    #[allow(missing_docs)] // The message explains the fields.
+    Triangle { triangle: usize, corner: DVec3 },
 }
 
 /// Returns whether all coordinates are in the range in which answers are exact.
 fn is_exact(point: DVec3) -> bool {
     point.to_array().iter().all(|&x| x == 0.0 || (DRay::LEAST..=DRay::MOST).contains(&x.abs()))
-}
-
-/// Returns the axis of a direction's largest component, the lowest on ties, without a branch that
-/// the processor could not predict.
-#[inline(always)]
-pub(crate) fn largest_axis(direction: DVec3) -> usize {
-    let [x, y, z] = direction.abs().to_array();
-    let axis = usize::from(y > x);
-    if z > x.max(y) { 2 } else { axis }
 }
 
 impl DRay {
@@ -177,8 +165,8 @@ impl DRay {
         f64::from_bits((2 * BIAS - exponent) << 52)
     }
 
-    fn is_in_range(&self, t: f64) -> bool {
-        self.t_min <= t && t <= self.t_max
+    fn line(&self) -> Line {
+        Line::new(self.origin, self.direction)
     }
 }
 
@@ -215,10 +203,9 @@ impl<'a> Select<'a> {
     /// [`WideBvh::nearest_hit_where`](crate::WideBvh::nearest_hit_where) and
     /// [`any_hit_where`](crate::WideBvh::any_hit_where): whether a hit counts, exactly.
     pub fn filter(self, ray: &'a Ray, triangles: &'a [Triangle]) -> impl FnMut(Hit) -> bool + 'a {
-        let ends = [ray.origin(), ray.direction()];
         move |Hit { object, .. }| {
             let Triangle(corners) = &triangles[object as usize];
-            self.admits(object, || Line::new(ends[0], ends[1]).side(ends, corners))
+            self.admits(object, || ray.line().side(corners))
         }
     }
 
@@ -300,7 +287,7 @@ impl DTriangle {
     /// Returns the weights of the corners, as
     /// [`Triangle::barycentrics`](crate::Triangle::barycentrics) does.
     pub fn barycentrics(&self, ray: &DRay) -> Option<[f64; 3]> {
-        Line::new(ray.origin, ray.direction).barycentrics(&self.0)
+        ray.line().barycentrics(&self.0)
     }
 
     /// Returns the unit normal, as [`Triangle::normal`](crate::Triangle::normal) does.
@@ -309,14 +296,13 @@ impl DTriangle {
     }
 
     fn distance(&self, ray: &DRay, is_moved: bool) -> Option<f64> {
-        let ends = [ray.origin, ray.direction];
-        let line = Line::new(ray.origin, ray.direction);
+        let line = ray.line();
         let t = match line.filter(&self.0) {
             // It crosses, and twice f64 nearly always rounds its distance.
-            Verdict::Between(..) => line.rounded(ends, &self.0),
-            _ => line.crossing(ends, &self.0, is_moved)?,
+            Verdict::Between(..) => line.rounded(&self.0),
+            _ => line.crossing(&self.0, is_moved)?,
         };
-        ray.is_in_range(t).then_some(t)
+        (ray.t_min <= t && t <= ray.t_max).then_some(t)
     }
 
     /// Returns whether the corners coincide or are collinear, in real arithmetic.
@@ -369,14 +355,6 @@ pub(crate) struct Query<'a> {
 }
 
 impl Query<'_> {
-    fn ends(&self) -> [DVec3; 2] {
-        [self.ray.origin, self.ray.direction]
-    }
-
-    fn line(&self) -> Line {
-        Line::new(self.ray.origin, self.ray.direction)
-    }
-
     /// Returns whether a hit is certainly out of the range or behind the nearest one.
     #[inline(always)]
     pub(crate) fn leaves_out(&self, nearest: &NearestHit, new: &NearestHit) -> bool {
@@ -431,11 +409,10 @@ impl Query<'_> {
         is_nearer
     }
 
-    /// Returns whether hits of a triangle count.
     #[inline(never)]
     pub(crate) fn counts(&self, object: u32) -> bool {
         let DTriangle(corners) = &self.triangles[object as usize];
-        self.select.admits(object, || self.line().side(self.ends(), corners))
+        self.select.admits(object, || self.ray.line().side(corners))
     }
 
     /// Finds bounds of the distance in f64.
@@ -448,7 +425,7 @@ impl Query<'_> {
     /// Finds the rounded distance.
     pub(crate) fn resolve(&self, hit: &mut NearestHit) {
         let DTriangle(corners) = &self.triangles[hit.object as usize];
-        hit.low = self.line().rounded(self.ends(), corners);
+        hit.low = self.ray.line().rounded(corners);
         hit.high = hit.low;
     }
 
@@ -457,11 +434,11 @@ impl Query<'_> {
     #[inline(never)]
     pub(crate) fn bounds(&self, object: u32) -> Option<(f64, f64)> {
         let DTriangle(corners) = &self.triangles[object as usize];
-        match self.line().filter(corners) {
+        match self.ray.line().filter(corners) {
             Verdict::Miss => None,
             Verdict::Between(low, high) => Some((low, high)),
             Verdict::Unsure => {
-                let t = self.line().crossing(self.ends(), corners, false)?;
+                let t = self.ray.line().crossing(corners, false)?;
                 Some((t, t))
             }
         }

@@ -195,9 +195,7 @@ impl Frame {
         }
         Aabb { min: round_down(min), max: round_up(max) }
     }
-}
 
-impl Frame {
     /// By how much the number is greater that is rounded to a reciprocal: 10u².
     pub(crate) const ABOVE: f64 = 1.0 + 10.0 / (1u64 << 48) as f64;
 
@@ -244,27 +242,17 @@ impl Frame {
 
 /// Returns the largest coordinate of a box.
 #[inline(always)]
-fn size(aabb: &Aabb) -> f32 {
+pub(crate) fn size(aabb: &Aabb) -> f32 {
     aabb.min.abs().max(aabb.max.abs()).max_element()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Triangle;
+    use crate::{Corners, Triangle};
     use glam::DQuat;
-    use num_bigint::BigInt;
+    use num_rational::BigRational;
     use proptest::prelude::*;
-
-    /// A number times 2^1200: an integer for coordinates, rotations and their products here.
-    fn exactly(x: f64) -> BigInt {
-        let bits = x.abs().to_bits();
-        let (exponent, fraction) = ((bits >> 52) as i64, bits & ((1 << 52) - 1));
-        let (mantissa, exponent) =
-            if exponent == 0 { (fraction, -1074) } else { (fraction | 1 << 52, exponent - 1075) };
-        let size = BigInt::from(mantissa) << (exponent + 1200) as u64;
-        if x < 0.0 { -size } else { size }
-    }
 
     proptest! {
         #[test]
@@ -278,24 +266,23 @@ mod tests {
             let rotation = DMat3::from_quat(DQuat::from_array(turn).normalize());
             let frame = Frame::new(rotation, DVec3::from(centre) * far).unwrap();
             let triangle = Triangle::from(corners.map(|x| x * size as f32));
-            let aabb = frame.aabb(&triangle);
-            let steps = BigInt::from(1) << 1200;
+            let aabb = frame.aabb_of(triangle.corners());
+            let exactly = |x: f64| BigRational::from_float(x).unwrap();
             for axis in 0..3 {
                 let along = frame.axes[axis];
-                let coordinates = triangle.0.map(|corner| -> BigInt {
+                let coordinates = triangle.0.map(|corner| -> BigRational {
                     let term = |i: usize| {
                         exactly(along[i]) * (exactly(corner[i].into()) - exactly(frame.centre[i]))
                     };
                     (0..3).map(term).sum()
                 });
-                let [min, max] = [aabb.min[axis], aabb.max[axis]]
-                    .map(|x| exactly(x.into()) * &steps);
+                let [min, max] = [aabb.min[axis], aabb.max[axis]].map(|x| exactly(x.into()));
                 let least = coordinates.iter().min().unwrap();
                 let most = coordinates.iter().max().unwrap();
                 prop_assert!(&min <= least && most <= &max);
                 // Two steps of f32, of which the error in f64 may be one.
                 let step = (size + far) * f64::from(f32::EPSILON) * 4.0;
-                prop_assert!(&max - &min <= most - least + exactly(step) * &steps);
+                prop_assert!(max - min <= most - least + exactly(step));
             }
         }
     }

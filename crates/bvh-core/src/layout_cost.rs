@@ -182,12 +182,8 @@ pub fn layout_row(tree: &impl LayoutTree, node: usize, both: CallBoth) -> Layout
 
 /// Returns the row of a node; the subtrees of so many `levels` from it are computed at once.
 fn row(tree: &impl LayoutTree, node: usize, levels: u32, both: CallBoth) -> LayoutCost {
-    let Ok([first, second]) = tree.children(node) else {
-        return row_alone(tree, node);
-    };
-    if levels == 0 {
-        return row_alone(tree, node);
-    }
+    let children = tree.children(node).ok().filter(|_| levels > 0);
+    let Some([first, second]) = children else { return row_alone(tree, node) };
     let [mut left, mut right] = [LayoutCost::leaf(0.0, 0); 2];
     both(&mut || left = row(tree, first, levels - 1, both), &mut || {
         right = row(tree, second, levels - 1, both)

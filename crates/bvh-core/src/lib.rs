@@ -9,7 +9,6 @@ pub mod cost;
 mod dispatch;
 mod double;
 mod exact;
-mod expansion;
 pub mod export;
 pub mod file;
 mod frame;

@@ -5,27 +5,14 @@ use glam::Vec3;
 
 /// The reason why arrays are rejected as a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages explain the fields.
 pub enum MeshError {
     /// A triangle refers to a position that does not exist.
     #[error("triangle {triangle} names position {index} of {positions}, counted from 0")]
-    Index {
-        /// The triangle.
-        triangle: usize,
-        /// The index found.
-        index: u32,
-        /// The number of positions.
-        positions: usize,
-    },
+    Index { triangle: usize, index: u32, positions: usize },
     /// A corner of a triangle has a NaN or infinite coordinate.
     #[error("position {index} of triangle {triangle} is {found}; accepted: finite coordinates")]
-    NotFinite {
-        /// The triangle.
-        triangle: usize,
-        /// The index of the position.
-        index: u32,
-        /// The position.
-        found: Vec3,
-    },
+    NotFinite { triangle: usize, index: u32, found: Vec3 },
     /// There are more triangles than a tree can hold.
     #[error("the mesh has {0} triangles; accepted: at most {MAX_OBJECTS}")]
     TooMany(usize),
@@ -99,19 +86,17 @@ mod tests {
         assert_eq!(Triangle::from_mesh::<[f32; 3]>(&[], &[]).unwrap(), []);
     }
 
-    fn rejection(points: [[f32; 3]; 3], indices: [[u32; 3]; 2]) -> String {
-        let error = Triangle::from_mesh(&points, &indices).unwrap_err();
-        error.to_string()
-    }
-
     #[test]
     fn an_error_of_a_mesh_reports_the_triangle_and_the_position() {
-        let good = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let message = rejection(good, [[0, 1, 2], [0, u32::MAX, 1]]);
-        assert!(message.starts_with("triangle 1 names position 4294967295"), "{message}");
-        for bad in [f32::NAN, f32::INFINITY] {
-            let message = rejection([good[0], good[1], [0.0, bad, 0.0]], [[0, 1, 0], [0, 1, 2]]);
-            assert!(message.starts_with("position 2 of triangle 1 is"), "{message}");
+        for y in [1.0, f32::NAN, f32::INFINITY] {
+            let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, y, 0.0]];
+            let index = if y.is_finite() { u32::MAX } else { 2 };
+            let found = Triangle::from_mesh(&points, &[[0, 1, 0], [0, index, 1]]).unwrap_err();
+            match found {
+                MeshError::Index { triangle: 1, index: u32::MAX, positions: 3 } if y == 1.0 => {}
+                MeshError::NotFinite { triangle: 1, index: 2, .. } if y != 1.0 => {}
+                _ => panic!("{found}"),
+            }
         }
     }
 }

@@ -44,12 +44,8 @@ pub enum InvalidRay {
     Direction(Vec3),
     /// The range is NaN or extends behind the origin.
     #[error("the ray's range {t_min}..={t_max} must not be NaN and must start at 0 or later")]
-    Range {
-        /// The smallest distance found.
-        t_min: f32,
-        /// The largest distance found.
-        t_max: f32,
-    },
+    #[allow(missing_docs)] // The message explains the fields.
+    Range { t_min: f32, t_max: f32 },
 }
 
 impl Ray {
@@ -77,7 +73,7 @@ impl Ray {
         if !(is_finite & Self::DIRECTION_RANGE.contains(&longest) & is_range) {
             return Err(Self::why_not(origin, direction, t_min, t_max));
         }
-        Ok(Self::made(origin, direction, t_min, t_max))
+        Ok(Self::with_inverse(origin, direction, 1.0 / direction, t_min, t_max))
     }
 
     /// Makes a ray like [`new`](Self::new), without the checks, for callers who know that they
@@ -98,11 +94,7 @@ impl Ray {
         let is_finite = (origin.extend(0.0).abs().cmple(Vec4::MAX)
             & direction.extend(0.0).abs().cmple(Vec4::MAX))
         .all();
-        Self::made(origin, direction, t_min, if is_finite { t_max } else { -1.0 })
-    }
-
-    #[inline]
-    fn made(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Self {
+        let t_max = if is_finite { t_max } else { -1.0 };
         Self::with_inverse(origin, direction, 1.0 / direction, t_min, t_max)
     }
 
@@ -186,7 +178,6 @@ impl Ray {
         self.direction.w
     }
 
-    /// Returns the origin and the direction.
     #[inline(always)]
     pub(crate) fn ends(&self) -> [Vec3; 2] {
         [self.origin(), self.direction()]
@@ -236,15 +227,6 @@ impl Hit {
 /// Returns 2^k for k from -126 to 127, in constants too.
 pub(crate) const fn pow2(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
-}
-
-/// Returns the axis of the direction's largest component, the lowest on ties, without a branch that
-/// the processor could not predict.
-#[inline(always)]
-pub(crate) fn largest_axis(ray: &Ray) -> usize {
-    let [x, y, z] = ray.direction().abs().to_array();
-    let axis = usize::from(y > x);
-    if z > x.max(y) { 2 } else { axis }
 }
 
 #[cfg(test)]

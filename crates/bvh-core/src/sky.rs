@@ -5,6 +5,7 @@
 //! direction together, as a beam.
 
 use crate::Traced;
+use crate::exact::largest_axis;
 use crate::wide::POINTS_OF_BEAM;
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use core::num::NonZeroU32;
@@ -36,28 +37,19 @@ pub struct Sky {
 
 /// The reason why numbers are rejected as a sky.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages explain the fields.
 pub enum InvalidSky {
     /// A direction is not finite, or zero, tiny or huge.
     #[error(
         "direction {index} is {found}; accepted: finite, its largest component between 2^-100 and 2^100"
     )]
-    Direction {
-        /// The number of the direction, from 0.
-        index: usize,
-        /// The direction found.
-        found: DVec3,
-    },
+    Direction { index: usize, found: DVec3 },
     /// The range is NaN or extends behind the points.
     #[error("the range {0}..={1} must not be NaN and must start at 0 or later")]
     Range(f64, f64),
     /// There are not as many weights for each direction.
     #[error("there are {weights} weights for {directions} directions; accepted: as many for each")]
-    Weights {
-        /// The number of weights.
-        weights: usize,
-        /// The number of directions.
-        directions: usize,
-    },
+    Weights { weights: usize, directions: usize },
     /// A weight is NaN or infinite.
     #[error("weight {0} is {1}; accepted: finite numbers")]
     Weight(usize, f64),
@@ -89,8 +81,7 @@ pub fn neighbours<P: Copy + Into<DVec3>>(points: &[P]) -> Vec<u32> {
         let at = |&number: &u32| points[number as usize];
         let low = numbers.iter().map(at).fold(DVec3::INFINITY, DVec3::min);
         let high = numbers.iter().map(at).fold(DVec3::NEG_INFINITY, DVec3::max);
-        let size = high - low;
-        let axis = if size.z > size.x.max(size.y) { 2 } else { usize::from(size.y > size.x) };
+        let axis = largest_axis(high - low);
         // Beams begin at multiples of their size, and end between halves.
         let unit = if count > POINTS_OF_BEAM { POINTS_OF_BEAM } else { FEW };
         let middle = (count / 2).div_ceil(unit) * unit;

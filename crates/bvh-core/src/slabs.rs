@@ -2,7 +2,7 @@
 
 use crate::aabb::{round_down, round_up};
 use crate::ray::pow2;
-use crate::{Aabb, Frame, Ray};
+use crate::{Aabb, Frame, Ray, frame};
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
 /// A ray prepared for tests against the boxes of one scene.
@@ -65,9 +65,8 @@ pub struct Slabs {
     far_ray: Option<FarRay>,
 }
 
-/// The factor of entries, 1 − 4u.
+/// The factors of entries and of exits, 1 − 4u and 1 + 4u.
 pub(crate) const NEAR: f32 = 1.0 - 4.0 * (f32::EPSILON / 2.0);
-/// The factor of exits, 1 + 4u.
 pub(crate) const FAR: f32 = 1.0 + 4.0 * (f32::EPSILON / 2.0);
 /// The factors in f64.
 pub(crate) const NEAR_DOUBLE: f64 = 1.0 - 8.0 * f64::EPSILON;
@@ -209,8 +208,7 @@ impl Ray {
 #[inline]
 pub(crate) fn near_region(bounds: &Aabb) -> Aabb {
     const HUGE: f32 = pow2(126);
-    let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-    if size >= HUGE {
+    if frame::size(bounds) >= HUGE {
         return Aabb::EMPTY;
     }
     let distance = 256.0 * (bounds.max - bounds.min).max_element();

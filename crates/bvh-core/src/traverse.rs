@@ -10,23 +10,6 @@
 //! the interval of the object's box. [`Triangle::intersect`](crate::Triangle::intersect),
 //! [`Sphere::intersect`](crate::Sphere::intersect) and [`clip_to_box`](crate::clip_to_box) return
 //! such distances.
-//!
-//! ```
-//! use bvh_core::{Aabb, Bvh, Hit, Node, Ray, PreparedRay, TestCounts, Triangle, nearest_hit, nearest_hit_by};
-//! use glam::Vec3;
-//! let corners = |z| [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)];
-//! let triangles = [0.0, 1.0].map(|z| Triangle(corners(z)));
-//! let [a, b] = triangles.map(|t| t.aabb());
-//! let tree = Bvh::new(vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)], vec![0, 1]);
-//! let ray = Ray::half_line(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z)?;
-//! assert_eq!(nearest_hit(&tree, &triangles, &ray), Some(Hit { t: 2.0, object: 1 }));
-//! let prepared = PreparedRay::new(&ray);
-//! let mut counts = TestCounts::default();
-//! let hit = nearest_hit_by(&tree, &ray, |id, t_max| triangles[id as usize].intersect(&prepared, t_max), &mut counts);
-//! assert_eq!(hit, Some(Hit { t: 2.0, object: 1 }));
-//! assert_eq!(counts, TestCounts { boxes: 3, objects: 1 });
-//! # Ok::<(), bvh_core::InvalidRay>(())
-//! ```
 
 use crate::{BvhView, Hit, NodeKind, Primitive, Ray, Slabs};
 use core::ops::ControlFlow;
@@ -105,9 +88,6 @@ pub fn any_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ra
 ///
 /// `tree` is a [`&Bvh`](crate::Bvh) or a view of one. `test(object, t_max)` returns the distance at
 /// which the ray hits the object if that distance is in `ray.t_min()..=t_max`.
-///
-/// # Panics
-/// May panic or not return for a tree that [`validate`](crate::validate()) rejects.
 #[inline]
 pub fn nearest_hit_by<'t>(
     tree: impl Into<BvhView<'t>>,
@@ -128,9 +108,6 @@ pub fn nearest_hit_by<'t>(
 ///
 /// `test(object)` returns whether the ray hits the object. Although any hit is enough, boxes are
 /// visited front to back: near objects fill more of the view and are more likely to be hit.
-///
-/// # Panics
-/// Under the same conditions as [`nearest_hit_by`].
 #[inline]
 pub fn any_hit_by<'t>(
     tree: impl Into<BvhView<'t>>,

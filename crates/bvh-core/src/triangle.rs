@@ -11,7 +11,6 @@ use glam::{Affine3A, DVec3, Vec3};
 pub struct Triangle(pub [Vec3; 3]);
 
 impl From<[[f32; 3]; 3]> for Triangle {
-    /// Makes a triangle from three corners.
     fn from(corners: [[f32; 3]; 3]) -> Self {
         Self(corners.map(Vec3::from))
     }
@@ -39,7 +38,6 @@ impl Triangle {
         Aabb::around(self.0)
     }
 
-    /// Returns the triangle's area in world units squared.
     pub(crate) fn area(&self) -> f64 {
         let [a, b, c] = self.0.map(|corner| corner.as_dvec3());
         0.5 * (b - a).cross(c - a).length()
@@ -103,7 +101,7 @@ impl Triangle {
     /// assert_eq!(triangle.intersect(&PreparedRay::new(&ray), 9.0), Some(1.0 / 3.0));
     /// ```
     pub fn intersect(&self, prepared: &PreparedRay, t_max: f32) -> Option<f32> {
-        let t = prepared.line.crossing(prepared.ray.ends(), &self.0, false)?;
+        let t = prepared.line.crossing(&self.0, false)?;
         (prepared.ray.t_min() <= t && t <= t_max).then_some(t)
     }
 
@@ -123,22 +121,16 @@ impl Triangle {
     /// assert_eq!(Triangle::from([a, c, d]).crossing(&diagonal), None);
     /// ```
     pub fn crossing(&self, ray: &Ray) -> Option<f32> {
-        let t = ray.line().crossing(ray.ends(), &self.0, true)?;
+        let t = ray.line().crossing(&self.0, true)?;
         (ray.t_min() <= t && t <= ray.t_max()).then_some(t)
     }
 }
 
 impl Frame {
-    /// Returns the smallest box in the frame that certainly contains the triangle: it is rounded
-    /// outwards.
-    #[inline]
-    pub fn aabb(&self, triangle: &Triangle) -> Aabb {
-        self.aabb_of(triangle.0.map(Vec3::as_dvec3))
-    }
-
-    /// Returns the box of every triangle in the frame, in the same order.
-    pub fn boxes(&self, triangles: &[Triangle]) -> Vec<Aabb> {
-        triangles.iter().map(|triangle| self.aabb(triangle)).collect()
+    /// Returns the smallest box in the frame that certainly contains the triangle, rounded outwards,
+    /// of every triangle in the same order.
+    pub fn boxes<T: Corners>(&self, triangles: &[T]) -> Vec<Aabb> {
+        InFrame { triangles, frame: Some(self) }.boxes()
     }
 }
 
@@ -159,7 +151,7 @@ impl Corners for Triangle {
 
     #[inline]
     fn aabb_in(&self, frame: Option<&Frame>) -> Aabb {
-        frame.map_or_else(|| self.aabb(), |frame| frame.aabb(self))
+        frame.map_or_else(|| self.aabb(), |frame| frame.aabb_of(self.corners()))
     }
 }
 

@@ -78,10 +78,12 @@
 //! predicates' (filters and expansions). Differs from Woop et al.: the shear decides no answer,
 //! because the next layer decides every answer within the errors of the shear.
 
+mod expansion;
 mod number;
 mod quotient;
 mod volumes;
 
+use glam::DVec3;
 pub(crate) use number::{Number, Point};
 pub(crate) use quotient::{NARROWER, Numbers, Twice, distance};
 use volumes::Volumes;
@@ -117,14 +119,21 @@ impl Line {
     pub(crate) fn new<P: Point>(origin: P, direction: P) -> Self {
         let origin = origin.double();
         let direction = direction.double();
-        let [x, y, z] = direction.map(f64::abs);
-        let axis = if z > larger(x, y) { 2 } else { usize::from(y > x) };
-        let axes = AXES[axis];
+        let axes = AXES[largest_axis(direction.into())];
         Self {
             origin: axes.map(|axis| origin[axis]),
             direction: axes.map(|axis| direction[axis]),
             axes,
         }
+    }
+
+    /// Returns the origin and the direction by axis.
+    fn ends(&self) -> [[f64; 3]; 2] {
+        [self.origin, self.direction].map(|ordered| {
+            let mut by_axis = [0.0; 3];
+            self.axes.into_iter().zip(ordered).for_each(|(axis, x)| by_axis[axis] = x);
+            by_axis
+        })
     }
 
     /// Returns the triangle's corners relative to the origin, in the order of `axes`.
@@ -210,29 +219,27 @@ impl Line {
     /// Returns the side from which the line comes to a triangle that it crosses: 1 along the normal,
     /// −1 against it, and 0 for a line parallel to its plane.
     #[inline]
-    pub(crate) fn side<P: Point>(&self, ray: [P; 2], triangle: &[P; 3]) -> i32 {
+    pub(crate) fn side<P: Point>(&self, triangle: &[P; 3]) -> i32 {
         let [first, second, third] = *triangle;
         let (normal, products) = normal(&self.edge(first, second), &self.edge(first, third));
         let along = dot(&self.direction, &normal);
         if ERROR * dot(&self.direction.map(f64::abs), &products) < along.abs() {
             return if along > 0.0 { 1 } else { -1 };
         }
-        let [origin, direction] = ray;
-        Volumes::new(origin, direction, triangle).map_or(0, |volumes| volumes.speed().sign())
+        Volumes::new(self, triangle).map_or(0, |volumes| volumes.speed().sign())
     }
 
     /// Returns the distance of the plane of a triangle that the line crosses at or in front of the
     /// origin, rounded once.
     #[inline(never)]
-    pub(crate) fn rounded<P: Point<Number = f64>>(&self, ray: [P; 2], triangle: &[P; 3]) -> f64 {
-        let [origin, direction] = ray;
+    pub(crate) fn rounded<P: Point<Number = f64>>(&self, triangle: &[P; 3]) -> f64 {
         let verdict = self.plane(&self.relative(triangle)[0], triangle);
         let mut nearly = 0.0;
         if let Verdict::Between(lowest, highest) = verdict {
             let [a, b, c] = triangle.map(P::double);
             let minus = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|i| Twice::difference(p[i], q[i]));
-            let corner = minus(a, origin.double());
-            let direction = direction.double();
+            let [origin, direction] = self.ends();
+            let corner = minus(a, origin);
             let Twice(high, low) = distance(&corner, &direction, &minus(b, a), &minus(c, a));
             let slack = (highest - lowest) * NARROWER;
             nearly = high + (low + slack);
@@ -240,7 +247,7 @@ impl Line {
                 return nearly + 0.0;
             }
         }
-        let volumes = Volumes::new(origin, direction, triangle);
+        let volumes = Volumes::new(self, triangle);
         volumes.and_then(|volumes| volumes.rounded_distance()).unwrap_or(nearly)
     }
 
@@ -249,13 +256,8 @@ impl Line {
     /// rule of [`Triangle::crossing`](crate::Triangle::crossing). Does not allocate.
     #[cold]
     #[inline(never)]
-    fn distance<P: Point>(
-        &self,
-        [origin, direction]: [P; 2],
-        triangle: &[P; 3],
-        is_moved: bool,
-    ) -> Option<P::Number> {
-        let volumes = Volumes::new(origin, direction, triangle)?;
+    fn distance<P: Point>(&self, triangle: &[P; 3], is_moved: bool) -> Option<P::Number> {
+        let volumes = Volumes::new(self, triangle)?;
         let corners = self.relative(triangle);
         let (edges, error) = self.edges(&corners);
         // The edge values in f64 are multiplied by the depth.
@@ -289,12 +291,10 @@ impl Line {
 
     /// Returns the rounded distance at which the ray crosses the triangle at or in front of the
     /// origin, by the rule of [`Triangle::crossing`](crate::Triangle::crossing) if the origin is
-    /// moved, otherwise by that of [`Triangle::intersect`](crate::Triangle::intersect). `self` is
-    /// the line of this origin and this direction.
+    /// moved, otherwise by that of [`Triangle::intersect`](crate::Triangle::intersect).
     #[inline(always)]
     pub(crate) fn crossing<P: Point>(
         &self,
-        ray: [P; 2],
         triangle: &[P; 3],
         is_moved: bool,
     ) -> Option<P::Number> {
@@ -304,9 +304,18 @@ impl Line {
         }
         match rounded(verdict) {
             Some(distance) => distance,
-            None => self.distance(ray, triangle, is_moved),
+            None => self.distance(triangle, is_moved),
         }
     }
+}
+
+/// Returns the axis of a vector's largest component, the lowest on ties, without a branch that the
+/// processor could not predict.
+#[inline(always)]
+pub(crate) fn largest_axis(vector: DVec3) -> usize {
+    let [x, y, z] = vector.abs().to_array();
+    let axis = usize::from(y > x);
+    if z > larger(x, y) { 2 } else { axis }
 }
 
 /// Returns the rounded distance, if the verdict decides it: `Some(None)` beyond every number.
@@ -319,7 +328,7 @@ fn rounded<N: Number>(verdict: Verdict) -> Option<Option<N>> {
 
 /// Returns whether a triangle has no area; false if a corner is not finite.
 pub(crate) fn is_degenerate<P: Point>(triangle: &[P; 3]) -> bool {
-    triangle.iter().all(|corner| corner.is_finite())
+    triangle.iter().all(|corner| corner.double().iter().all(|x| x.is_finite()))
         && (0..3).all(|axis| normal_sign(triangle, axis) == 0)
 }
 

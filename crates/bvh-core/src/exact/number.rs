@@ -7,7 +7,6 @@ pub(crate) trait Number: Copy + PartialEq + PartialOrd {
     /// Rounds to the nearest number, ties to even.
     fn rounded(x: f64) -> Self;
 
-    /// Returns the same number in f64.
     fn double(self) -> f64;
 
     fn next_up(self) -> Self;
@@ -21,7 +20,7 @@ pub(crate) trait Number: Copy + PartialEq + PartialOrd {
 }
 
 macro_rules! number {
-    ($name:ident) => {
+    ($name:ident $point:ident) => {
         impl Number for $name {
             #[inline(always)]
             fn rounded(x: f64) -> Self {
@@ -50,36 +49,23 @@ macro_rules! number {
                 self.is_finite()
             }
         }
-    };
-}
-number!(f32);
-number!(f64);
 
-/// A point or a direction of one of the numbers.
-pub(crate) trait Point: Copy {
-    type Number: Number;
-
-    /// Returns the coordinates in f64.
-    fn double(self) -> [f64; 3];
-
-    fn is_finite(self) -> bool;
-}
-
-macro_rules! point {
-    ($name:ident $number:ident) => {
-        impl Point for $name {
-            type Number = $number;
+        impl Point for $point {
+            type Number = $name;
 
             #[inline(always)]
             fn double(self) -> [f64; 3] {
                 self.to_array().map(f64::from)
             }
-
-            fn is_finite(self) -> bool {
-                self.is_finite()
-            }
         }
     };
 }
-point!(Vec3 f32);
-point!(DVec3 f64);
+number!(f32 Vec3);
+number!(f64 DVec3);
+
+/// A point or a direction of one of the numbers.
+pub(crate) trait Point: Copy {
+    type Number: Number;
+
+    fn double(self) -> [f64; 3];
+}

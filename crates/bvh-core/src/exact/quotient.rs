@@ -14,7 +14,7 @@
 //! than (120ε²N + 100ε²|t|M) / |d · n| · 8/7 and these, which is less than 512ε² (N + |t|M) / |d · n|:
 //! 2⁻⁴⁸ times the bound in f64.
 
-use crate::expansion::two_product;
+use super::expansion::two_product;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// The factor from bounds in f64 to bounds here.
@@ -48,7 +48,6 @@ impl<D: Numbers> Twice<D> {
         Self(sum, (a - a_part) + (b - b_part))
     }
 
-    /// The exact difference of two numbers.
     #[inline(always)]
     pub(crate) fn difference(a: D, b: D) -> Self {
         let difference = a - b;

@@ -1,7 +1,7 @@
 //! The exact values that decide whether a ray hits a triangle, as expansions.
 
-use super::{Number, Point};
-use crate::expansion::Expansion;
+use super::expansion::Expansion;
+use super::{Line, Number, Point};
 
 /// An exact difference of two points.
 type Vector = [Expansion<2>; 3];
@@ -20,8 +20,8 @@ fn difference(p: [f64; 3], q: [f64; 3]) -> Vector {
 fn add_cross(sum: &mut Expansion<16>, p: &Vector, q: &Vector, axis: usize) {
     let i = (axis + 1) % 3;
     let j = (axis + 2) % 3;
-    sum.add_product(&p[i], &q[j]);
-    sum.subtract_product(&p[j], &q[i]);
+    sum.add_product(&p[i], &q[j], 1.0);
+    sum.add_product(&p[j], &q[i], -1.0);
 }
 
 /// The exact values that decide whether a ray hits a triangle.
@@ -37,15 +37,13 @@ const EDGES: [[usize; 2]; 3] = [[2, 1], [0, 2], [1, 0]];
 
 impl Volumes {
     /// Prepares exact values; `None` if a coordinate is not finite.
-    pub(super) fn new<P: Point>(origin: P, direction: P, triangle: &[P; 3]) -> Option<Self> {
-        let [a, b, c] = *triangle;
-        let is_finite = [a, b, c, origin, direction].iter().all(|point| point.is_finite());
-        if !is_finite {
-            return None;
-        }
+    pub(super) fn new<P: Point>(line: &Line, triangle: &[P; 3]) -> Option<Self> {
         let triangle = triangle.map(P::double);
-        let corners = triangle.map(|corner| difference(corner, origin.double()));
-        Some(Self { direction: direction.double(), triangle, corners })
+        let [origin, direction] = line.ends();
+        let corners = triangle.map(|corner| difference(corner, origin));
+        let points = [origin, direction].into_iter().chain(triangle);
+        let is_finite = points.flatten().all(f64::is_finite);
+        is_finite.then_some(Self { direction, triangle, corners })
     }
 
     /// Returns the side of an edge on which the ray is: −1, 0 or 1.
@@ -99,7 +97,7 @@ impl Volumes {
         for axis in 0..3 {
             let mut normal = Expansion::zero();
             add_cross(&mut normal, &to_second, &to_third, axis);
-            height.add_product(&normal, &self.corners[0][axis]);
+            height.add_product(&normal, &self.corners[0][axis], 1.0);
             speed.add_scaled(&normal, self.direction[axis]);
         }
         (height, speed)

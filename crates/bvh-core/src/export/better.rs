@@ -42,9 +42,6 @@ impl Target {
     /// The area of a tree does not tell which one is better, above all for a smooth mesh in
     /// `three-mesh-bvh`, whose traversal leaves a box out only where a hit lies before it along one
     /// axis. O(objects), and a few thousand rays.
-    ///
-    /// # Panics
-    /// May panic on trees that [`validate`](crate::validate()) rejects.
     pub fn fit_better(&self, searched: &Bvh, own: &Bvh, triangles: &[Triangle]) -> Better {
         let [searched, own] = [self.fit(searched), self.fit(own)];
         let [ours, theirs] = self.counted_costs([&searched, &own], triangles);

@@ -17,14 +17,11 @@ use bytemuck::{Pod, Zeroable};
 /// | 28..32 | `u32` | number of object ids of a leaf; 0 for an inner node |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
+#[allow(missing_docs)] // The table explains the fields.
 pub struct FirstCountNode {
-    /// Lower corner of the box.
     pub min: [f32; 3],
-    /// Index of the first of two adjacent children, or position of the leaf's first object id.
     pub first: u32,
-    /// Upper corner of the box.
     pub max: [f32; 3],
-    /// Number of object ids of a leaf; 0 for an inner node.
     pub count: u32,
 }
 
@@ -33,9 +30,6 @@ impl Bvh {
     /// nodes refer to the tree's [`prim_ids`](Bvh::prim_ids). A node with more than two children
     /// becomes several nodes, which halve the children in their order. Boxes lie in the tree's
     /// [frame](Bvh::frame). O(nodes).
-    ///
-    /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn to_first_count(&self) -> Vec<FirstCountNode> {
         first_count(&binary(self), 0)
     }
@@ -43,9 +37,6 @@ impl Bvh {
     /// Converts the tree like [`to_first_count`](Self::to_first_count), but with an unused node at
     /// index 1. Every pair of siblings then begins at an even index and shares a cache line, as in
     /// `tinybvh`.
-    ///
-    /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn to_first_count_aligned(&self) -> Vec<FirstCountNode> {
         first_count(&binary(self), 1)
     }

@@ -173,7 +173,7 @@ impl Target {
     ///
     /// # Panics
     /// Panics if the tree lies in a [frame](crate::Frame): other tracers have boxes along the file's
-    /// axes. May panic on a tree that [`validate`](crate::validate()) rejects.
+    /// axes.
     pub fn fit(&self, tree: &Bvh) -> Bvh {
         assert!(tree.frame.is_none(), "a tree along the file's axes");
         let mut fitted =

@@ -17,14 +17,11 @@ use bytemuck::{Pod, Zeroable};
 /// | 28..32 | `u32` | axis along which the first child is the lower one; of a leaf, the number of triangles, with 0xffff in the upper half |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
+#[allow(missing_docs)] // The table explains the fields.
 pub struct ThreeMeshNode {
-    /// Lower corner of the box.
     pub min: [f32; 3],
-    /// Upper corner of the box.
     pub max: [f32; 3],
-    /// Distance to the second child, or position of the leaf's first triangle.
     pub below: u32,
-    /// Axis, or number of triangles with the mark of a leaf.
     pub axis_or_count: u32,
 }
 
@@ -48,7 +45,7 @@ impl Bvh {
     ///
     /// # Panics
     /// Panics if a leaf has more than 65 535 objects; [`Target::fit`](super::Target::fit) divides
-    /// such leaves. May panic on a tree that [`validate`](crate::validate()) rejects.
+    /// such leaves.
     pub fn to_three_mesh(&self) -> Vec<ThreeMeshNode> {
         let tree = binary(self);
         let mut nodes: Vec<ThreeMeshNode> = Vec::with_capacity(tree.nodes.len());

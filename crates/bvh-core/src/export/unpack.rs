@@ -50,20 +50,17 @@ pub(super) fn unpack(
                 Node::inner(aabb, first as u32, 2)
             }
             Below::Objects { first, count } => {
-                // `first + count` could overflow, so `count` is subtracted instead.
-                if count == 0
-                    || count as usize > objects
-                    || first as usize > objects - count as usize
-                {
-                    return Err(InvalidBvh::BadLeaf { node, first, count, objects });
-                }
+                let range = first as usize..(first as usize).saturating_add(count as usize);
+                let ids = prim_ids.get(range).filter(|ids| !ids.is_empty());
+                let ids = ids.ok_or(InvalidBvh::BadLeaf { node, first, count, objects })?;
                 // The leaves of a forged array may share ids and together have more than there are.
-                let named = tree.prim_ids.len() + count as usize;
+                let start = tree.prim_ids.len();
+                let named = start + ids.len();
                 if named > objects {
                     return Err(InvalidBvh::ObjectCount { named, objects });
                 }
-                tree.prim_ids.extend_from_slice(&prim_ids[first as usize..][..count as usize]);
-                Node::leaf(aabb, (named - count as usize) as u32, count)
+                tree.prim_ids.extend_from_slice(ids);
+                Node::leaf(aabb, start as u32, count)
             }
         };
     }

@@ -1,12 +1,11 @@
 //! The errors of tree files.
 
+use super::Header;
 use crate::InvalidBvh;
-
-/// The version of the format.
-pub(super) const VERSION: u32 = 4;
 
 /// The reason why bytes are rejected as a tree file, or why a tree cannot be written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages explain the fields.
 pub enum FileError {
     /// The first eight bytes are not the magic number of tree files.
     #[error("not a tree file")]
@@ -17,12 +16,9 @@ pub enum FileError {
     /// The file has another version of the format. None before this one was released.
     #[error(
         "the tree was written by version {found} of the format; this program reads version {}: bake it again, or update the program",
-        VERSION
+        Header::VERSION
     )]
-    Version {
-        /// The version found.
-        found: u32,
-    },
+    Version { found: u32 },
     /// A field of the header has a value that no tree can have.
     #[error("the header's {0} is out of range; the file is damaged")]
     Field(&'static str),
@@ -33,33 +29,18 @@ pub enum FileError {
     #[error(
         "the file has {found} bytes where its header asks for {expected}; it was cut or extended"
     )]
-    Length {
-        /// Bytes in the file.
-        found: u64,
-        /// Bytes that the header requires.
-        expected: u64,
-    },
+    Length { found: u64, expected: u64 },
     /// A byte of the file has changed.
     #[error("the file's checksum is wrong; it is damaged")]
     Checksum,
     /// The tree was saved for a scene with another number of objects.
     #[error("the file is for a scene of {expected} objects; this one has {found}")]
-    ObjectCount {
-        /// Objects in the scene.
-        found: usize,
-        /// Objects in the file.
-        expected: usize,
-    },
+    ObjectCount { found: usize, expected: usize },
     /// The tree was saved for another scene, or for the same objects in another order.
     #[error(
         "the file is for another scene: its objects' checksum is {expected:08x}, this scene's is {found:08x}"
     )]
-    OtherScene {
-        /// The scene's checksum.
-        found: u32,
-        /// The checksum in the file.
-        expected: u32,
-    },
+    OtherScene { found: u32, expected: u32 },
     /// The tree is over triangles in f64, and the objects are others.
     #[error("the tree is over triangles in f64; accepted: the same triangles in double precision")]
     Double,

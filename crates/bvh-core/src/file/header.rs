@@ -1,7 +1,7 @@
 //! The header of a tree file, its first 192 bytes: format, sizes, cost, origin, and the checksum of
 //! the scene.
 
-use super::error::{FileError, VERSION};
+use super::FileError;
 use crate::cost::{Objective, SahConstants};
 use crate::{Aabb, Frame, MAX_OBJECTS, Node};
 use bytemuck::{Pod, Zeroable};
@@ -46,12 +46,10 @@ impl Header {
     /// ends or clears high bits changes them.
     pub const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
     /// The version of the format, the only one that is written and read.
-    pub const VERSION: u32 = VERSION;
-    /// The flag of a file that has visits.
+    pub const VERSION: u32 = 4;
+    /// The flags.
     const VISITS: u32 = 1;
-    /// The flag of a file that has a frame.
     const FRAME: u32 = 2;
-    /// The flag of a file for triangles in f64.
     const DOUBLE: u32 = 4;
     /// A number whose stored bytes identify the byte order of the file.
     pub(super) const ENDIANNESS: u32 = 0x0102_0304;
@@ -137,7 +135,7 @@ impl Header {
         }
         let bytes = bytes.get(..Self::BYTES).ok_or(FileError::Header)?;
         let stored: Stored = bytemuck::pod_read_unaligned(bytes);
-        if stored.version != VERSION {
+        if stored.version != Self::VERSION {
             return Err(FileError::Version { found: stored.version });
         }
         if stored.endianness != Self::ENDIANNESS {

@@ -83,6 +83,7 @@ use crate::cost::{CallBoth, Objective, call_in_turn};
 use crate::validate::{Leaves, check_nesting, check_structure, validate_parts};
 use crate::{Aabb, Bvh, BvhView, DTriangle, Frame, InvalidBvh, Node, Primitives, validate};
 use bytemuck::Pod;
+use core::iter::repeat;
 use crc32fast::Hasher;
 use glam::{DVec3, Vec3};
 use std::borrow::Cow;
@@ -187,20 +188,14 @@ fn check_visits(nodes: &[Node], visits: &[f32]) -> Result<(), FileError> {
     if visits.len() != nodes.len() {
         return Err(FileError::Visits(visits.len().min(nodes.len())));
     }
-    if !visits.is_empty() {
-        check_range(visits, 0, 1.0)?;
-    }
-    for (parent, node) in nodes.iter().enumerate() {
-        for child in node.children() {
-            check_range(visits, child, visits[parent])?;
-        }
-    }
-    Ok(())
-}
-
-fn check_range(visits: &[f32], node: usize, most: f32) -> Result<(), FileError> {
+    let below =
+        nodes.iter().zip(visits).flat_map(|(node, most)| node.children().zip(repeat(*most)));
+    let root = nodes.iter().take(1).map(|_| (0, 1.0));
     // NaN is in no range.
-    if (0.0..=most).contains(&visits[node]) { Ok(()) } else { Err(FileError::Visits(node)) }
+    match root.chain(below).find(|&(node, most)| !(0.0..=most).contains(&visits[node])) {
+        Some((node, _)) => Err(FileError::Visits(node)),
+        None => Ok(()),
+    }
 }
 
 /// Returns a copy of the tree over `boxes` that is in `bytes`, with the checks of

@@ -6,9 +6,7 @@ use glam::{DVec3, Vec4};
 
 /// The number of cells of the grid along each axis.
 pub(super) const CELLS: usize = 32;
-/// The number of grid points along each axis.
 const POINTS: usize = CELLS + 1;
-/// The upper end of the grid along each axis, in cells.
 const END: f64 = CELLS as f64;
 
 #[inline]
@@ -20,9 +18,8 @@ pub(super) fn index(cell: [usize; 3]) -> usize {
 pub(super) struct Crossings {
     /// The number of segments that meet the grid.
     pub segments: u32,
-    /// The number of segments that start in each cell.
     starts: Vec<u32>,
-    /// The number of segments that cross each face: `[axis][downward][plane][cell of the plane]`.
+    /// `[axis][downward][plane][cell of the plane]`.
     faces: [[Vec<u32>; 2]; 3],
 }
 

@@ -90,13 +90,11 @@ pub struct RayDensity {
 
 /// The place of a grid in the world.
 struct Grid {
-    /// The lower corner of the grid, in world units.
     low: DVec3,
     cells_per_unit: DVec3,
 }
 
 impl Grid {
-    /// Makes the grid of a scene with these bounds.
     fn new(bounds: &Aabb) -> Result<Self, DensityError> {
         let min = bounds.min.as_dvec3();
         let max = bounds.max.as_dvec3();
@@ -174,15 +172,9 @@ impl RayDensity {
     /// 0, boxes that no sample enters are not free; a tenth works well. O(segments · cells that a
     /// segment visits).
     ///
-    /// Segments are extended at both ends by a quarter of a cell along their main axis. Rays end on
-    /// surfaces, most rays also begin on surfaces, and boxes are around surfaces. Every ray that
-    /// ends on a wall enters a flat box around the wall. But the density is interpolated within a
-    /// cell. Between the last face that rays cross and the next face, which they do not cross, half
-    /// of the rays would seem to be missing.
-    ///
-    /// # Errors
-    /// Returns a [`DensityError`] if there are no segments or too many, if none meets the bounds,
-    /// if one is not finite, or if the bounds or the weight are invalid.
+    /// Segments are extended at both ends by a quarter of a cell along their main axis. Most rays
+    /// begin and end on surfaces, which boxes are around. Between the last face of a cell that rays
+    /// cross and the next one, half of those that end on a wall would seem to miss the box around it.
     pub fn of_rays(
         bounds: &Aabb,
         segments: &[Segment],

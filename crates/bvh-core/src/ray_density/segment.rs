@@ -43,19 +43,14 @@ impl Segment {
 /// The reason why a density cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs)] // The messages explain the fields.
 pub enum DensityError {
     /// A segment has a coordinate that is NaN or infinite.
     #[error("segment {index} has a coordinate that is not finite")]
-    NotFinite {
-        /// Index of the segment.
-        index: usize,
-    },
+    NotFinite { index: usize },
     /// There are no segments, or too many to count them exactly.
     #[error("{segments} segments; accepted: 1 to {most}", most = RayDensity::MOST_SEGMENTS)]
-    Count {
-        /// The number of segments.
-        segments: usize,
-    },
+    Count { segments: usize },
     /// No segment meets the scene.
     #[error("none of the segments meets the bounds of the scene")]
     NoneMeets,

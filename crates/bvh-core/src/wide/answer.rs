@@ -16,7 +16,6 @@ pub(crate) const NEAREST_HIT: bool = false;
 
 /// A question about rays, with the place of the answers by the number of the ray.
 pub(crate) trait Find {
-    /// The rays of the batch.
     type Rays: Rays;
     /// Whether the first hit that is found ends a ray.
     const ANY: bool = false;
@@ -74,7 +73,6 @@ pub(crate) trait Find {
     ) {
     }
 
-    /// Answers one ray by itself.
     fn alone(&mut self, wide: &WideBvh, number: usize);
 }
 

@@ -1,9 +1,9 @@
 //! The points of the triangles closest to given points.
 
 use super::answer::NEAREST_HIT;
+use super::beam::Obstacles;
 use super::box_ray::BoxTest;
 use super::double::DWideBvh;
-use super::double_block::DoubleBlock;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{DoubleLanes, Lanes, Mask};
@@ -13,7 +13,7 @@ use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::ray::pow2;
 use crate::triangle::offset_from;
-use crate::{Aabb, Hit, Kernel, Triangle};
+use crate::{Aabb, Corners, DTriangle, Frame, Hit, Kernel};
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
 
@@ -108,7 +108,8 @@ impl WideBvh {
     /// # Panics
     /// Panics if `points` and `closest` are not equally many.
     pub fn closest_points(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
-        closest_points(self, points, closest);
+        let surface = Surface { obstacles: self, frame: self.frame(), doubles: None };
+        surface.closest_points(points, closest);
     }
 }
 
@@ -126,131 +127,77 @@ impl DWideBvh {
     /// # Panics
     /// Panics if `points` and `closest` are not equally many.
     pub fn closest_points(&self, points: &[DVec3], closest: &mut [Option<Closest>]) {
-        closest_points(self, points, closest);
+        let doubles = Some(&self.triangles[..]);
+        let surface = Surface { obstacles: self, frame: Some(&self.frame), doubles };
+        surface.closest_points(points, closest);
     }
 }
 
 /// A layout of triangles in f32 or in f64.
-trait Surface {
-    type Point: Copy;
-
-    fn wide(&self) -> &WideBvh;
-
-    fn target(point: Self::Point) -> DVec3;
-
-    /// The point as the distances of boxes are computed from it.
-    fn boxed(&self, point: Self::Point) -> Vec3;
-
-    /// Returns the corners of a triangle of a block.
-    fn corners(&self, object: u32, triangle: &Triangle) -> [DVec3; 3];
-
-    /// Returns the corners of a block's triangles.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`, which has four lanes.
-    unsafe fn lanes<L: Lanes>(&self, block: &TriangleBlock) -> [Vector<L::Double>; 3];
+struct Surface<'a, O> {
+    obstacles: &'a O,
+    /// The frame of the boxes, if it is not the file's.
+    frame: Option<&'a Frame>,
+    /// The triangles by id, if they are in f64.
+    doubles: Option<&'a [DTriangle]>,
 }
 
-impl Surface for WideBvh {
-    type Point = Vec3;
-
-    fn wide(&self) -> &WideBvh {
-        self
+impl<O: Obstacles> Surface<'_, O> {
+    fn closest_points(&self, points: &[O::Point], closest: &mut [Option<Closest>]) {
+        assert_eq!(points.len(), closest.len(), "an answer for every point");
+        let kernel = self.obstacles.boxes().kernel;
+        if kernel != Kernel::Portable {
+            let task = ClosestPoints { surface: self, points, closest };
+            // SAFETY: a layout's kernel is available.
+            return unsafe { vector::dispatch(kernel, task) };
+        }
+        for (&point, closest) in points.iter().zip(closest) {
+            *closest = self.closest_portable(point.into());
+        }
     }
 
-    fn target(point: Vec3) -> DVec3 {
-        point.as_dvec3()
-    }
-
-    fn boxed(&self, point: Vec3) -> Vec3 {
-        self.boxed_point(point)
-    }
-
-    fn corners(&self, _: u32, triangle: &Triangle) -> [DVec3; 3] {
-        triangle.0.map(Vec3::as_dvec3)
-    }
-
+    /// Returns a point as the distances of boxes are computed from it; `None` if it is not finite.
     #[inline(always)]
-    unsafe fn lanes<L: Lanes>(&self, block: &TriangleBlock) -> [Vector<L::Double>; 3] {
-        // SAFETY: the processor has the instructions.
-        let [a, b, c] = unsafe { block.corners_along::<L>(TriangleBlock::ROWS) };
-        [doubled(a), doubled(b), doubled(c)]
-    }
-}
-
-impl Surface for DWideBvh {
-    type Point = DVec3;
-
-    fn wide(&self) -> &WideBvh {
-        &self.wide
+    fn boxed(&self, point: DVec3) -> Option<Vec3> {
+        // A point that is moved nearer is not farther from any box.
+        let in_frame = |frame: &Frame| frame.point(point).as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+        let boxed = self.frame.map_or(point.as_vec3(), in_frame);
+        (point.is_finite() && boxed.is_finite()).then_some(boxed)
     }
 
-    fn target(point: DVec3) -> DVec3 {
-        point
-    }
-
-    fn boxed(&self, point: DVec3) -> Vec3 {
-        // As in `WideBvh::boxed_point`.
-        self.frame.point(point).as_vec3().clamp(Vec3::MIN, Vec3::MAX)
-    }
-
-    fn corners(&self, object: u32, _: &Triangle) -> [DVec3; 3] {
-        self.triangles[object as usize].0
-    }
-
-    #[inline(always)]
-    unsafe fn lanes<L: Lanes>(&self, block: &TriangleBlock) -> [Vector<L::Double>; 3] {
-        let block = DoubleBlock::new(block, &self.triangles);
-        // SAFETY: the processor has the instructions.
-        unsafe { block.corners_along::<L>([0, 1, 2]) }
-    }
-}
-
-fn closest_points<S: Surface>(surface: &S, points: &[S::Point], closest: &mut [Option<Closest>]) {
-    assert_eq!(points.len(), closest.len(), "an answer for every point");
-    let kernel = surface.wide().kernel;
-    if kernel != Kernel::Portable {
-        let task = ClosestPoints { surface, points, closest };
-        // SAFETY: a layout's kernel is available.
-        return unsafe { vector::dispatch(kernel, task) };
-    }
-    for (&point, closest) in points.iter().zip(closest) {
-        *closest = closest_portable(surface, point);
-    }
-}
-
-fn closest_portable<S: Surface>(surface: &S, point: S::Point) -> Option<Closest> {
-    let wide = surface.wide();
-    let target = S::target(point);
-    let mut nearest = Nearest::new(target);
-    let boxed = surface.boxed(point);
-    let scale = scale(boxed, wide.root_box());
-    let scaled = (boxed * scale).to_array();
-    let intervals = |node: &WideNode| {
-        let mut sums = [0.0; WideNode::LANES];
-        for (axis, &scaled) in scaled.iter().enumerate() {
-            for (lane, sum) in sums.iter_mut().enumerate() {
-                let below = node.planes[axis][lane] * scale - scaled;
-                let above = scaled - node.planes[axis + 3][lane] * scale;
-                let outside = below.max(above).max(0.0);
-                *sum += outside * outside;
+    fn closest_portable(&self, target: DVec3) -> Option<Closest> {
+        let wide = self.obstacles.boxes();
+        let boxed = self.boxed(target)?;
+        let mut nearest = Nearest::new(target);
+        let scale = scale(boxed, wide.root_box());
+        let scaled = (boxed * scale).to_array();
+        let intervals = |node: &WideNode| {
+            let mut sums = [0.0; WideNode::LANES];
+            for (axis, &scaled) in scaled.iter().enumerate() {
+                for (lane, sum) in sums.iter_mut().enumerate() {
+                    let below = node.planes[axis][lane] * scale - scaled;
+                    let above = scaled - node.planes[axis + 3][lane] * scale;
+                    let outside = below.max(above).max(0.0);
+                    *sum += outside * outside;
+                }
             }
-        }
-        // Unused lanes are infinitely far away.
-        (sums, [f32::MAX; WideNode::LANES])
-    };
-    let visit = |block: &TriangleBlock, limit: &mut Hit| {
-        for (object, triangle) in block.triangles() {
-            let corners = surface.corners(object, &triangle);
-            nearest.offer(object, offset_from(target, corners));
-        }
-        limit.t = nearest.limit(scale);
-        false
-    };
-    if target.is_finite() && boxed.is_finite() {
+            // Unused lanes are infinitely far away.
+            (sums, [f32::MAX; WideNode::LANES])
+        };
+        let visit = |block: &TriangleBlock, limit: &mut Hit| {
+            for (object, triangle) in block.triangles() {
+                let corners = match self.doubles {
+                    None => triangle.corners(),
+                    Some(triangles) => triangles[object as usize].0,
+                };
+                nearest.offer(object, offset_from(target, corners));
+            }
+            limit.t = nearest.limit(scale);
+            false
+        };
         portable::traverse::<NEAREST_HIT>(wide, f32::MAX, intervals, &mut (), visit);
+        nearest.closest()
     }
-    nearest.closest()
 }
 
 /// Returns the power of two that makes the largest coordinate about 1, so that no square overflows.
@@ -261,35 +208,36 @@ fn scale(point: Vec3, bounds: &Aabb) -> f32 {
 }
 
 /// The search for the closest points of points by a vector kernel.
-struct ClosestPoints<'a, S: Surface> {
-    surface: &'a S,
-    points: &'a [S::Point],
+struct ClosestPoints<'a, O: Obstacles> {
+    surface: &'a Surface<'a, O>,
+    points: &'a [O::Point],
     closest: &'a mut [Option<Closest>],
 }
 
-impl<K: Instructions, S: Surface> Task<K> for ClosestPoints<'_, S> {
+impl<K: Instructions, O: Obstacles> Task<K> for ClosestPoints<'_, O> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run(self) {
         let Self { surface, points, closest } = self;
-        let wide = surface.wide();
+        let wide = surface.obstacles.boxes();
         let mut stack = [const { MaybeUninit::<Pending>::uninit() }; STACK + SPARE];
         let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
         let stack =
             deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
         for (&point, closest) in points.iter().zip(closest) {
-            let boxed = surface.boxed(point);
-            if !(S::target(point).is_finite() && boxed.is_finite()) {
+            let target = point.into();
+            let Some(boxed) = surface.boxed(target) else {
                 *closest = None;
                 continue;
-            }
+            };
             // SAFETY: the processor has the instructions; the stack has room for `stack_need`
             // children and one register more.
             *closest = unsafe {
                 let boxes = PointLanes::<K::Boxes>::new(boxed, wide.root_box());
                 let scale = boxes.scale_of_one;
-                let mut triangles = TargetLanes::<_, K::Block>::new(surface, point, scale);
+                let mut triangles =
+                    TargetLanes::<_, K::Block>::new(surface.obstacles, target, scale);
                 // Unused lanes are infinitely far away.
                 visit::<K, NEAREST_HIT>(wide, f32::MAX, &boxes, &mut triangles, stack);
                 triangles.nearest.closest()
@@ -350,8 +298,8 @@ impl<K: Instructions> BoxTest<K> for PointLanes<K::Boxes> {
 }
 
 /// A point in f64, in the lanes of a block of triangles, and its nearest triangle.
-struct TargetLanes<'a, S, L: Lanes> {
-    surface: &'a S,
+struct TargetLanes<'a, O, L: Lanes> {
+    obstacles: &'a O,
     target: [L::Double; 3],
     nearest: Nearest,
     scale: f32,
@@ -359,25 +307,25 @@ struct TargetLanes<'a, S, L: Lanes> {
 
 type Vector<D> = [D; 3];
 
-impl<'a, S: Surface, L: Lanes> TargetLanes<'a, S, L> {
+impl<'a, O: Obstacles, L: Lanes> TargetLanes<'a, O, L> {
     #[inline(always)]
-    unsafe fn new(surface: &'a S, point: S::Point, scale: f32) -> Self {
-        let nearest = Nearest::new(S::target(point));
-        let DVec3 { x, y, z } = nearest.target;
+    unsafe fn new(obstacles: &'a O, target: DVec3, scale: f32) -> Self {
+        let nearest = Nearest::new(target);
+        let DVec3 { x, y, z } = target;
         // SAFETY: the processor has the instructions.
         let target = unsafe { [L::Double::splat(x), L::Double::splat(y), L::Double::splat(z)] };
-        Self { surface, target, nearest, scale }
+        Self { obstacles, target, nearest, scale }
     }
 }
 
-impl<K: Instructions, S: Surface> Leaves<K> for TargetLanes<'_, S, K::Block> {
+impl<K: Instructions, O: Obstacles> Leaves<K> for TargetLanes<'_, O, K::Block> {
     /// Offers the triangles of a block that are as near as the nearest so far, and lowers `limit` to
     /// the greatest bound that a box with a nearer triangle may have.
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, limit: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions; there is room for four numbers.
         unsafe {
-            let [a, b, c] = self.surface.lanes::<K::Block>(block);
+            let [a, b, c] = self.obstacles.corners::<K::Block>(block, [0, 1, 2]);
             let target = self.target;
             let offset = offset(minus(a, target), minus(b, target), minus(c, target));
             let most = offset[0].filled(self.nearest.distance_squared);
@@ -455,11 +403,6 @@ fn select<D: DoubleLanes>(mask: D::Mask, yes: Vector<D>, no: Vector<D>) -> Vecto
 #[inline(always)]
 fn into_box<D: DoubleLanes>(point: Vector<D>, min: Vector<D>, max: Vector<D>) -> Vector<D> {
     lesser(max, greater(min, point))
-}
-
-#[inline(always)]
-fn doubled<L: Lanes>([x, y, z]: [L; 3]) -> Vector<L::Double> {
-    [x.double(), y.double(), z.double()]
 }
 
 #[inline(always)]

@@ -31,13 +31,11 @@ use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
 
-/// The number of rays in flight.
 const FLIGHT: usize = 48;
 
 /// The maximum number of rays that are prepared at once.
 const RAYS: usize = 16;
 
-/// Answers the rays of these numbers.
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions, F: Find>(
     wide: &WideBvh,

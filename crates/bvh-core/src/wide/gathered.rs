@@ -7,7 +7,6 @@ use super::triangles::{TriangleBlock, three_by_three};
 use crate::exact::Line;
 use crate::{Hit, Ray, Triangle};
 
-/// The maximum number of pairs.
 const PAIRS: usize = TriangleBlock::LANES * Gathered::RAYS;
 
 /// A number of every pair.
@@ -47,7 +46,6 @@ impl Gathered {
         self.count = 0;
     }
 
-    /// Returns the number of a pair's ray, and the lane of its triangle.
     #[inline(always)]
     pub(crate) fn names(&self, pair: usize) -> (usize, usize) {
         let [ray, lane] = self.names[pair];
@@ -166,6 +164,6 @@ impl Decided {
 
 #[inline(always)]
 pub(super) fn hit_of(ray: &Ray, line: &Line, object: u32, triangle: &Triangle) -> Option<Hit> {
-    let t = line.crossing(ray.ends(), &triangle.0, true)?;
+    let t = line.crossing(&triangle.0, true)?;
     (ray.t_min() <= t && t <= ray.t_max()).then_some(Hit { t, object })
 }

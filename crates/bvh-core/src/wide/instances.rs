@@ -31,14 +31,8 @@ pub struct Instance {
 pub enum InvalidInstances {
     /// The part does not exist.
     #[error("instance {instance} is of part {part} of {parts}, counted from 0")]
-    Part {
-        /// The instance.
-        instance: usize,
-        /// The part found.
-        part: u32,
-        /// The number of parts.
-        parts: usize,
-    },
+    #[allow(missing_docs)] // The message explains the fields.
+    Part { instance: usize, part: u32, parts: usize },
     /// The part has no triangle that a ray could hit.
     #[error("instance {0} is of a part without triangles")]
     Empty(usize),

@@ -19,7 +19,6 @@ pub(crate) type Pending = u64;
 /// The last bits of the keys.
 static LAST_BITS: Aligned<[u32; 8]> = Aligned([8, 7, 6, 5, 4, 3, 2, 1]);
 
-/// Returns the lane of a key.
 #[inline(always)]
 pub(crate) fn lane_of(key: u32) -> usize {
     (key.wrapping_neg() & 7) as usize
@@ -34,7 +33,6 @@ pub(crate) fn last_key(nearest: f32) -> u32 {
 /// A part of a kernel that is compiled once for an instruction set and called, so that its callers
 /// stay small, or are compiled without the instructions.
 pub(crate) trait Task<K: Instructions> {
-    /// The result.
     type Output;
 
     /// Runs the task. Is inlined into a function that is compiled with the instructions.

@@ -8,6 +8,21 @@ use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 #[repr(align(64))]
 pub(crate) struct Aligned<T>(pub(crate) T);
 
+/// Functions that are one expression each.
+macro_rules! functions {
+    ($(fn $name:ident($($parameters:tt)*) -> $result:ty = $value:expr;)*) => {$(
+        #[inline(always)]
+        fn $name($($parameters)*) -> $result {
+            #[allow(unused_unsafe)]
+            unsafe {
+                $value
+            }
+        }
+    )*};
+}
+#[allow(unused_imports)] // Some machines have no vector kernel.
+pub(crate) use functions;
+
 /// `N` numbers of f32, or of u32 where an operation says so.
 ///
 /// A value exists only where the processor has the instructions: what makes one out of nothing is
@@ -23,14 +38,10 @@ pub(crate) trait Lanes:
     + BitOr<Output = Self>
     + BitXor<Output = Self>
 {
-    /// The number of lanes.
     const N: usize;
-    /// A set of lanes.
     type Mask: Mask;
-    /// One f64 per lane.
     type Double: DoubleLanes;
 
-    /// The same number in all lanes.
     unsafe fn splat(x: f32) -> Self;
 
     /// `N` numbers from memory.
@@ -45,10 +56,8 @@ pub(crate) trait Lanes:
     /// There is room.
     unsafe fn store(self, to: *mut f32);
 
-    /// The lesser; of two zeros, or a NaN and a number, `other`.
+    /// The lesser, or the greater; of two zeros, or a NaN and a number, `other`.
     fn min(self, other: Self) -> Self;
-
-    /// The greater; of two zeros, or a NaN and a number, `other`.
     fn max(self, other: Self) -> Self;
 
     /// `self · factor + term`, rounded once, or twice where no instruction fuses them. The error
@@ -61,13 +70,9 @@ pub(crate) trait Lanes:
         self * factor - term
     }
 
-    /// Where `self < other`; not where either is NaN.
+    /// Where `self` is less than, at most, or equal to `other`; not where either is NaN.
     fn lt(self, other: Self) -> Self::Mask;
-
-    /// Where `self <= other`; not where either is NaN.
     fn le(self, other: Self) -> Self::Mask;
-
-    /// Where `self == other`; not where either is NaN.
     fn eq(self, other: Self) -> Self::Mask;
 
     /// Where `self < other` as u32.
@@ -82,7 +87,6 @@ pub(crate) trait Lanes:
     /// `yes` where the mask is set, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
-    /// The same numbers in f64.
     fn double(self) -> Self::Double;
 
     /// The numbers of f64 rounded to f32.
@@ -129,7 +133,6 @@ pub(crate) trait Lanes:
         unsafe { Self::Mask::from_bits(bits) }
     }
 
-    /// The sizes.
     #[inline(always)]
     fn abs(self) -> Self {
         self & self.filled_with_bits(u32::MAX >> 1)
@@ -149,10 +152,8 @@ pub(crate) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
 pub(crate) trait DoubleLanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// A set of lanes.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
-    /// The same number in all lanes.
     unsafe fn splat(x: f64) -> Self;
 
     /// As many numbers from any place as there are lanes.
@@ -174,7 +175,6 @@ pub(crate) trait DoubleLanes:
         unsafe { Self::splat(x) }
     }
 
-    /// The sizes.
     #[inline(always)]
     fn abs(self) -> Self {
         self.max(self.filled(0.0) - self)
@@ -186,11 +186,12 @@ pub(crate) trait DoubleLanes:
         self.filled(1.0) / self
     }
 
-    /// The lesser, as [`Lanes::min`].
+    /// As those of [`Lanes`].
     fn min(self, other: Self) -> Self;
-
-    /// The greater, as [`Lanes::max`].
     fn max(self, other: Self) -> Self;
+    fn lt(self, other: Self) -> Self::Mask;
+    fn le(self, other: Self) -> Self::Mask;
+    fn eq(self, other: Self) -> Self::Mask;
 
     /// `self · factor + term`, as [`mul_sub`](Self::mul_sub).
     fn mul_add(self, factor: Self, term: Self) -> Self;
@@ -199,17 +200,12 @@ pub(crate) trait DoubleLanes:
     /// both.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
 
-    /// The rounded products and their rounding errors.
-    fn two_product(self, other: Self) -> (Self, Self);
-
-    /// Where `self < other`.
-    fn lt(self, other: Self) -> Self::Mask;
-
-    /// Where `self <= other`.
-    fn le(self, other: Self) -> Self::Mask;
-
-    /// Where `self == other`.
-    fn eq(self, other: Self) -> Self::Mask;
+    /// The rounded products and their rounding errors, where products are fused.
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        let product = self * other;
+        (product, self.mul_sub(other, product))
+    }
 }
 
 impl<D: DoubleLanes> Numbers for D {

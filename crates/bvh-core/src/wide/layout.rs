@@ -105,20 +105,6 @@ impl Places {
 /// [`Triangle::intersect`](crate::Triangle::intersect) over the same triangles, bit by bit, on
 /// every machine and with every [`Kernel`]; the fastest one that the processor has is chosen when
 /// the layout is made.
-///
-/// ```
-/// use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
-/// use glam::Vec3;
-/// let corners = |z| [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)];
-/// let triangles = [0.0, 1.0].map(|z| Triangle(corners(z)));
-/// let [a, b] = triangles.map(|t| t.aabb());
-/// let tree = Bvh::new(vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)], vec![0, 1]);
-/// let wide = WideBvh::new(&tree, &triangles)?;
-/// let ray = Ray::half_line(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z).unwrap();
-/// assert_eq!(wide.nearest_hit(&ray), Some(Hit { t: 2.0, object: 1 }));
-/// assert!(wide.any_hit(&ray));
-/// # Ok::<(), bvh_core::InvalidBvh>(())
-/// ```
 #[derive(Clone, Debug)]
 pub struct WideBvh {
     /// A box around the triangles along the file's axes.
@@ -203,22 +189,12 @@ impl WideBvh {
         }
     }
 
-    /// Returns a finite point as the distances of boxes are computed from it.
-    pub(crate) fn boxed_point(&self, point: Vec3) -> Vec3 {
-        self.framed.as_ref().map_or(point, |framed| {
-            let point = framed.frame.point(point.as_dvec3()).as_vec3();
-            // A point that is moved nearer is not farther from any box.
-            point.clamp(Vec3::MIN, Vec3::MAX)
-        })
-    }
-
     /// The ray as the portable kernel tests boxes with it.
     #[inline(always)]
     pub(crate) fn slabs(&self, ray: &Ray) -> Slabs {
         Slabs::in_frame(ray, self.frame(), self.root_box())
     }
 
-    /// The frame that the boxes lie in, if it is not the file's.
     #[inline(always)]
     pub(crate) fn frame(&self) -> Option<&Frame> {
         self.framed.as_ref().map(|framed| &framed.frame)

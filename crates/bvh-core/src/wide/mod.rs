@@ -25,7 +25,6 @@ mod layout;
 mod obstacles;
 mod one_ray;
 mod packet;
-mod packet_bounds;
 mod packet_vector;
 mod pairs;
 mod pinhole;
@@ -102,6 +101,7 @@ impl WideBvh {
     /// let wide = WideBvh::new(&tree, &triangles)?;
     /// let ray = Ray::half_line([0.2, 0.2, 3.0], [0.0, 0.0, -1.0]).unwrap();
     /// assert_eq!(wide.nearest_hit(&ray), Some(Hit { t: 3.0, object: 0 }));
+    /// assert!(wide.any_hit(&ray));
     /// # Ok::<(), bvh_core::InvalidBvh>(())
     /// ```
     pub fn new(tree: &Bvh, triangles: &[Triangle]) -> Result<Self, InvalidBvh> {

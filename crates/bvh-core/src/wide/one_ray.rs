@@ -7,8 +7,7 @@ use super::lanes::{Aligned, Lanes, Mask};
 use super::layout::{Child, WideBvh};
 use super::pairs::{Crossings, Pairs};
 use super::triangles::TriangleBlock;
-use crate::exact::AXES;
-use crate::ray::largest_axis;
+use crate::exact::{AXES, largest_axis};
 use crate::{Hit, Ray};
 use core::mem::MaybeUninit;
 
@@ -38,11 +37,9 @@ pub(crate) trait Filter {
     /// Whether all hits do, so that any hit needs no distance.
     const ACCEPTS_ALL: bool;
 
-    /// Returns whether a hit counts.
     fn accepts(&mut self, hit: Hit) -> bool;
 }
 
-/// The filter that accepts all hits.
 pub(crate) struct All;
 
 impl Filter for All {
@@ -300,7 +297,7 @@ impl<L: Lanes> LeafRay<L> {
         let origin = ray.origin().to_array();
         let direction = ray.direction().to_array();
         let reach = ray.reach(&wide.bounds) * wide.error_factor;
-        let axes = AXES[largest_axis(ray)];
+        let axes = AXES[largest_axis(ray.direction().into())];
         // SAFETY: the processor has the instructions.
         unsafe {
             let [x, y, z] = axes;

@@ -39,7 +39,6 @@ impl<L: Lanes> Nearest<L> {
         self.object = L::select(hits, high.filled_with_bits(object), self.object);
     }
 
-    /// Returns what is known of the hit in every lane.
     #[inline(always)]
     pub(super) fn known(&self) -> [Known; 16] {
         let mut numbers = [[0.0; 16]; 3];

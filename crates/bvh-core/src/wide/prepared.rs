@@ -5,7 +5,7 @@ use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
 use super::pairs::Pairs;
-use super::ray_lanes::{BoxLanes, RayLanes};
+use super::ray_lanes::{BoxLanes, Loaded, RayLanes};
 use super::triangles::{TriangleBlock, three_by_three};
 use crate::Aabb;
 use crate::exact::AXES;
@@ -57,7 +57,7 @@ pub(crate) struct Prepared {
 
 impl<L: Lanes> Ready<L> {
     #[inline(always)]
-    pub(crate) fn new((rays, boxed): (RayLanes<L>, BoxLanes<L>), wide: &WideBvh) -> Self {
+    pub(crate) fn new((rays, boxed): Loaded<L>, wide: &WideBvh) -> Self {
         let reach = rays.reach(&wide.bounds);
         let reach = reach * reach.filled(wide.error_factor);
         let far = boxed.beyond(wide.near_box());
@@ -167,7 +167,6 @@ impl Prepared {
         [x, y, z, dx, dy, dz, self.x_slope, self.y_slope, self.reach, self.t_min]
     }
 
-    /// The axes of the shear.
     #[inline(always)]
     pub(crate) fn axes(&self) -> &'static [usize; 3] {
         // SAFETY: it is an axis.

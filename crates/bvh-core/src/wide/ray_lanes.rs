@@ -23,19 +23,22 @@ pub(crate) struct BoxLanes<L> {
     pub(crate) inverse: [L; 3],
 }
 
+/// Rays in both forms.
+pub(crate) type Loaded<L> = (RayLanes<L>, BoxLanes<L>);
+
 /// The rays of a batch, in f32 or in f64.
 pub(crate) trait Rays: Copy {
     fn count(self) -> usize;
 
-    /// Returns the rays from number `first` on, in both forms; `frame` is that of the boxes.
+    /// Returns the rays from number `first` on; `frame` is that of the boxes.
     ///
     /// # Safety
     /// The processor has the instructions, and there are a ray per lane.
-    unsafe fn load<L: Lanes>(
-        self,
-        first: usize,
-        frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>);
+    #[inline(always)]
+    unsafe fn load<L: Lanes>(self, first: usize, frame: Option<&Frame>) -> Loaded<L> {
+        // SAFETY: the caller's, and no lane lacks a ray.
+        unsafe { self.load_up_to(first, first + L::N, frame) }
+    }
 
     /// Does the same; the last ray before `end` fills the lanes that have none.
     ///
@@ -46,7 +49,7 @@ pub(crate) trait Rays: Copy {
         first: usize,
         end: usize,
         frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>);
+    ) -> Loaded<L>;
 
     /// Fetches the rays from number `first` on, as many as a vector's. They need not exist. While a
     /// packet is traced, the processor does not see that the rays of the next one follow.
@@ -63,14 +66,21 @@ impl Rays for &[Ray] {
     }
 
     #[inline(always)]
-    unsafe fn load<L: Lanes>(
+    unsafe fn load_up_to<L: Lanes>(
         self,
         first: usize,
+        end: usize,
         frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>) {
-        // SAFETY: there are a ray per lane; a ray is three vectors of four lanes.
+    ) -> Loaded<L> {
+        // SAFETY: the rays exist, or the padding does; a ray is three vectors of four lanes.
         unsafe {
-            let rays = self.as_ptr().add(first);
+            let padded: [Ray; 16];
+            let rays = if first + L::N <= end {
+                self.as_ptr().add(first)
+            } else {
+                padded = core::array::from_fn(|i| self[(first + i).min(end - 1)]);
+                padded.as_ptr()
+            };
             let [ox, oy, oz, t_min] = transpose::<L>(rays, 0);
             let [dx, dy, dz, t_max] = transpose::<L>(rays, 1);
             let [ix, iy, iz, _] = transpose(rays, 2);
@@ -84,23 +94,6 @@ impl Rays for &[Ray] {
                 }
             };
             (RayLanes { origin, direction, t_min, t_max }, boxed)
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn load_up_to<L: Lanes>(
-        self,
-        first: usize,
-        end: usize,
-        frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>) {
-        // SAFETY: the rays exist, or the padding does.
-        unsafe {
-            if first + L::N <= end {
-                return self.load(first, frame);
-            }
-            let padded: [Ray; 16] = core::array::from_fn(|i| self[(first + i).min(end - 1)]);
-            (&padded[..]).load(0, frame)
         }
     }
 

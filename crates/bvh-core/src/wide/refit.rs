@@ -101,7 +101,6 @@ impl WideBvh {
         triangles.fold(Aabb::EMPTY, |aabb, (_, triangle)| aabb.union(&triangle.aabb_in(frame)))
     }
 
-    /// The boxes of all nodes and leaves.
     pub(super) fn boxes(&self) -> impl Iterator<Item = (Aabb, Child)> {
         let lanes = self.nodes.iter().flat_map(|node| {
             let child = move |lane| Some((node.lane_box(lane)?, node.children[lane]));
@@ -110,7 +109,6 @@ impl WideBvh {
         self.root.map(|root| (*self.root_box(), root)).into_iter().chain(lanes)
     }
 
-    /// The blocks of a leaf.
     pub(super) fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
         let blocks = &self.blocks[leaf.index()..];
         let end =

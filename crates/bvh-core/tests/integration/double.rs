@@ -1,49 +1,13 @@
 //! Rays and triangles in f64: hits as in exact rationals, and every kernel as a test of every
 //! triangle.
 
-use crate::support::rational::{cross, dot, exactly as point, minus};
+use crate::support::rational::{distance, dot, exactly, is_rounded_to, normal, zero};
 use crate::support::{Random, SHAPES, ball, chain, grid_box, junction, soup, tree};
 use bvh_core::{
     Bvh, Coherence, DHit, DRay, DTriangle, DWideBvh, Frame, InsideRule, Kernel, Orientation,
     OutOfExactRange, Select, Solid,
 };
 use glam::{DMat3, DQuat, DVec3};
-use num_bigint::BigInt;
-use num_rational::BigRational;
-
-/// Returns the real distance by Cramer's rule, and the sign of d · n.
-fn cramer(ray: &DRay, triangle: &DTriangle) -> Option<(BigRational, i32)> {
-    let zero = BigRational::from_integer(BigInt::ZERO);
-    let [a, b, c] = triangle.0.map(point);
-    let direction = point(ray.direction());
-    let p = minus(&b, &a);
-    let q = minus(&c, &a);
-    let height = cross(&direction, &q);
-    let determinant = dot(&p, &height);
-    if determinant == zero {
-        return None;
-    }
-    let from_a = minus(&point(ray.origin()), &a);
-    let aside = cross(&from_a, &p);
-    let [t, v, w] = [dot(&q, &aside), dot(&from_a, &height), dot(&direction, &aside)]
-        .map(|numerator| numerator / &determinant);
-    let is_hit =
-        t >= zero && v >= zero && w >= zero && v + w <= BigRational::from_integer(1.into());
-    let along = dot(&direction, &cross(&p, &q));
-    is_hit.then(|| (t, if along > zero { 1 } else { -1 }))
-}
-
-fn is_rounded_to(x: &BigRational, rounded: f64) -> bool {
-    let middle = |a: f64, b: f64| {
-        let sum = BigRational::from_float(a).unwrap() + BigRational::from_float(b).unwrap();
-        sum / BigRational::from_integer(2.into())
-    };
-    let is_even = rounded.to_bits() & 1 == 0;
-    let below = (rounded > 0.0).then(|| middle(rounded.next_down(), rounded));
-    let above = middle(rounded, rounded.next_up());
-    below.is_none_or(|below| x > &below || is_even && x == &below)
-        && (x < &above || is_even && x == &above)
-}
 
 /// Returns scenes in f64 at many places and sizes, turned, with what f32 could not hold.
 fn scenes(random: &mut Random) -> Vec<(String, Vec<DTriangle>)> {
@@ -124,9 +88,12 @@ fn hits_and_distances_are_those_of_real_arithmetic_rounded_once() {
             for _ in 0..12 {
                 let triangle = random.of(&triangles);
                 let found = triangle.intersect(&ray);
-                let real = cramer(&ray, &triangle);
+                let real = distance([ray.origin(), ray.direction()], triangle.0);
                 let is_right = match &real {
-                    Some((t, _)) => found.is_some_and(|found| is_rounded_to(t, found)),
+                    Some(real) => found.is_some_and(|t| {
+                        let is_even = t.to_bits() & 1 == 0;
+                        is_rounded_to(real, [t.next_down(), t, t.next_up()], is_even)
+                    }),
                     None => found.is_none(),
                 };
                 assert!(is_right, "{name}: {found:?} {real:?} {ray:?} {triangle:?}");
@@ -141,9 +108,7 @@ fn hits_and_distances_are_those_of_real_arithmetic_rounded_once() {
 fn brute_force(triangles: &[DTriangle], ray: &DRay, select: Select) -> Option<DHit> {
     let hit = |(object, triangle): (u32, &DTriangle)| {
         let t = triangle.intersect(ray)?;
-        let [a, b, c] = triangle.0.map(point);
-        let along = dot(&point(ray.direction()), &cross(&minus(&b, &a), &minus(&c, &a)));
-        let is_exiting = along > BigRational::from_integer(BigInt::ZERO);
+        let is_exiting = dot(&exactly(ray.direction()), &normal(triangle.0)) > zero();
         let counts = match select.orientation {
             Orientation::Any => true,
             Orientation::Exiting => is_exiting,

@@ -1,69 +1,35 @@
 //! Hits and distances agree with real arithmetic, rounded once: a comparison with exact rationals.
 
-use crate::support::rational::{Vector, cross, dot, exactly, minus};
+use crate::support::rational::{distance, is_rounded_to, normal, zero};
 use crate::support::{Random, size};
 use bvh_core::{PreparedRay, Ray, Triangle};
 use glam::Vec3;
-use num_bigint::BigInt;
-use num_rational::BigRational;
 use proptest::prelude::*;
-
-fn point(p: Vec3) -> Vector {
-    exactly(p.as_dvec3())
-}
-
-/// Returns the distance and the weights of the second and third corner by Cramer's rule (Möller &
-/// Trumbore 1997), with other products than the library.
-fn cramer(ray: &Ray, triangle: &Triangle) -> Option<[BigRational; 3]> {
-    let [a, b, c] = triangle.0.map(point);
-    let origin = point(ray.origin());
-    let direction = point(ray.direction());
-    let p = minus(&b, &a);
-    let q = minus(&c, &a);
-    let height = cross(&direction, &q);
-    let determinant = dot(&p, &height);
-    if determinant.numer() == &BigInt::ZERO {
-        return None;
-    }
-    let from_a = minus(&origin, &a);
-    let aside = cross(&from_a, &p);
-    let quotients = [dot(&q, &aside), dot(&from_a, &height), dot(&direction, &aside)];
-    Some(quotients.map(|numerator| numerator / &determinant))
-}
-
-/// Returns whether a number that is not negative is `rounded` to the nearest f32, ties to even;
-/// beyond the largest f32, infinity takes the place of 2¹²⁸.
-fn is_rounded_to(x: &BigRational, rounded: f32) -> bool {
-    let size = |x: f32| if x.is_finite() { f64::from(x) } else { 2f64.powi(128) };
-    // The middle of two neighbours is exact in f64.
-    let middle = |a: f32, b: f32| BigRational::from_float(f64::midpoint(size(a), size(b))).unwrap();
-    let below = (rounded > 0.0).then(|| middle(rounded.next_down(), rounded));
-    let above = rounded.is_finite().then(|| middle(rounded, rounded.next_up()));
-    let is_even = rounded.to_bits() & 1 == 0;
-    below.is_none_or(|below| x > &below || is_even && x == &below)
-        && above.is_none_or(|above| x < &above || is_even && x == &above)
-}
 
 /// Compares one ray and one triangle. Returns whether the ray hits.
 fn check(ray: &Ray, triangle: &Triangle) -> bool {
-    let zero = BigRational::from_integer(BigInt::ZERO);
-    let one = BigRational::from_integer(BigInt::from(1));
-    let real = cramer(ray, triangle)
-        .filter(|[t, v, w]| [t, v, w].iter().all(|&x| x >= &zero) && v + w <= one);
+    let corners = triangle.0.map(Vec3::as_dvec3);
+    let real = distance([ray.origin(), ray.direction()].map(Vec3::as_dvec3), corners);
     // Without a range.
     let whole = Ray::half_line(ray.origin(), ray.direction()).unwrap();
     let found = triangle.intersect(&PreparedRay::new(&whole), f32::MAX);
-    let distance = found.unwrap_or(f32::INFINITY);
+    let t = found.unwrap_or(f32::INFINITY);
+    // Beyond the largest f32, infinity takes the place of 2¹²⁸.
+    let size = |x: f32| if x.is_finite() { f64::from(x) } else { 2f64.powi(128) };
+    let above = if t.is_finite() { size(t.next_up()) } else { f64::INFINITY };
     let is_right = match &real {
-        Some([t, ..]) => is_rounded_to(t, distance) && distance.is_sign_positive(),
+        Some(real) => {
+            let is_even = t.to_bits() & 1 == 0;
+            is_rounded_to(real, [size(t.next_down()), size(t), above], is_even)
+                && t.is_sign_positive()
+        }
         None => found.is_none(),
     };
     assert!(is_right, "{found:?} {real:?} {ray:?} {triangle:?}");
     let in_range = triangle.intersect(&PreparedRay::new(ray), ray.t_max());
     assert_eq!(in_range, found.filter(|&t| ray.t_min() <= t && t <= ray.t_max()), "{ray:?}");
-    let [a, b, c] = triangle.0.map(point);
-    let normal = cross(&minus(&b, &a), &minus(&c, &a));
-    assert_eq!(triangle.is_degenerate(), normal.iter().all(|x| x == &zero), "{triangle:?}");
+    let is_degenerate = normal(corners).iter().all(|x| x == &zero());
+    assert_eq!(triangle.is_degenerate(), is_degenerate, "{triangle:?}");
     in_range.is_some()
 }
 

@@ -16,17 +16,18 @@ fn returned(tree: &Bvh) -> [(&'static str, Bvh); 3] {
     ]
 }
 
+fn one_leaf(boxes: &[Aabb]) -> Bvh {
+    let count = boxes.len() as u32;
+    Bvh::new(vec![Node::leaf(Aabb::union_of(boxes), 0, count)], (0..count).collect())
+}
+
 fn check(name: &str, tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> usize {
     let boxes = boxes(triangles);
     let rays = rays(triangles, 600, random);
     for (layout, returned) in returned(tree) {
         for ray in &rays {
-            let expected = nearest_hit(tree, triangles, ray);
-            assert_eq!(
-                nearest_hit(&returned, triangles, ray),
-                expected,
-                "{name}, {layout}: {ray:?}"
-            );
+            let [found, expected] = [&returned, tree].map(|tree| nearest_hit(tree, triangles, ray));
+            assert_eq!(found, expected, "{name}, {layout}: {ray:?}");
         }
         // Boxes are never smaller than the tight ones.
         let mut tight = returned.clone();
@@ -60,12 +61,8 @@ fn every_layout_traces_the_hits_of_the_tree_at_every_scale() {
             let triangles = scaled(&scene, root * root);
             for shape in SHAPES {
                 let tree = tree(&boxes(&triangles), shape, &mut random);
-                hits += check(
-                    &format!("{name} * 2^{exponent}, {shape:?}"),
-                    &tree,
-                    &triangles,
-                    &mut random,
-                );
+                let name = format!("{name} * 2^{exponent}, {shape:?}");
+                hits += check(&name, &tree, &triangles, &mut random);
             }
         }
     }
@@ -82,11 +79,7 @@ fn small_trees_deep_trees_and_trees_of_points_have_layouts() {
         [soup(1, &mut random), soup(3, &mut random), points, soup(300, &mut random), huge.into()]
     {
         let boxes = boxes(&triangles);
-        let count = boxes.len() as u32;
-        let leaf = Node::leaf(Aabb::EMPTY, 0, count);
-        let mut one_leaf = Bvh::new(vec![leaf], (0..count).collect());
-        one_leaf.refit(&boxes);
-        check("one leaf", &one_leaf, &triangles, &mut random);
+        check("one leaf", &one_leaf(&boxes), &triangles, &mut random);
         check("chain", &chain(&boxes), &triangles, &mut random);
     }
     for (layout, returned) in returned(&Bvh::default()) {
@@ -161,9 +154,7 @@ fn a_fitted_tree_has_what_the_tracer_accepts_and_traces_the_same_hits() {
     let triangles = soup(700, &mut random);
     let boxes = boxes(&triangles);
     let rays = rays(&triangles, 300, &mut random);
-    let mut one_leaf = Bvh::new(vec![Node::leaf(Aabb::EMPTY, 0, 700)], (0..700).collect());
-    one_leaf.refit(&boxes);
-    let trees = [tree(&boxes, SHAPES[0], &mut random), chain(&boxes), one_leaf];
+    let trees = [tree(&boxes, SHAPES[0], &mut random), chain(&boxes), one_leaf(&boxes)];
     let strict = Target { most_objects: 3, most_depth: 11, ..Target::OBVHS };
     for target in Target::ALL.into_iter().chain([strict]) {
         for tree in &trees {
@@ -173,9 +164,8 @@ fn a_fitted_tree_has_what_the_tracer_accepts_and_traces_the_same_hits() {
             for node in &fitted.nodes {
                 assert!(node.prims().len() <= target.most_objects as usize);
                 assert!(node.is_leaf() || node.children().len() == 2);
-                let areas =
-                    fitted.nodes[node.children()].iter().map(|child| child.aabb.half_area());
-                assert!(areas.is_sorted_by(|first, second| first >= second), "{target:?}");
+                let areas = fitted.nodes[node.children()].iter().map(|node| node.aabb.half_area());
+                assert!(areas.rev().is_sorted(), "{target:?}");
             }
             // A tree that is accepted as it is never becomes dearer.
             let binary = Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap();
@@ -184,8 +174,9 @@ fn a_fitted_tree_has_what_the_tracer_accepts_and_traces_the_same_hits() {
                 assert!(target.cost(&fitted) <= target.cost(&binary), "{target:?}");
             }
             for ray in &rays {
-                let expected = nearest_hit(tree, &triangles, ray);
-                assert_eq!(nearest_hit(&fitted, &triangles, ray), expected);
+                let [found, expected] =
+                    [&fitted, tree].map(|tree| nearest_hit(tree, &triangles, ray));
+                assert_eq!(found, expected);
             }
         }
     }
@@ -204,11 +195,8 @@ fn a_file_for_a_tracer_has_the_documented_header_nodes_and_ids() {
             let (nodes, ids) =
                 text.strip_prefix("{\"nodes\":[").unwrap().split_once(",\"ids\":[").unwrap();
             let node = |text: &str| {
-                let numbers: Vec<f64> = text
-                    .split(',')
-                    .filter(|word| !word.is_empty())
-                    .map(|word| word.parse().unwrap())
-                    .collect();
+                let words = text.split(',').filter(|word| !word.is_empty());
+                let numbers: Vec<f64> = words.map(|word| word.parse().unwrap()).collect();
                 let exact = |number: f64| {
                     assert_eq!(f64::from(number as f32), number);
                     number as f32

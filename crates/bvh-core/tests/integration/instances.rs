@@ -18,15 +18,11 @@ struct Scene {
 }
 
 fn scene(triangles: Vec<Vec<Triangle>>, transforms: Vec<Affine3A>, random: &mut Random) -> Scene {
-    let mut parts = Vec::new();
-    for part in &triangles {
-        let tree = tree(&boxes(part), SHAPES[0], random);
-        parts.push(WideBvh::new(&tree, part).unwrap());
-    }
-    let mut instances = Vec::new();
-    for (index, transform) in transforms.into_iter().enumerate() {
-        instances.push(Instance { part: (index % parts.len()) as u32, transform });
-    }
+    let mut tree_of = |part: &Vec<Triangle>| tree(&boxes(part), SHAPES[0], random);
+    let parts = triangles.iter().map(|part| WideBvh::new(&tree_of(part), part).unwrap()).collect();
+    let numbers = (0..triangles.len() as u32).cycle();
+    let instances = numbers.zip(transforms);
+    let instances = instances.map(|(part, transform)| Instance { part, transform }).collect();
     Scene { triangles, parts, instances }
 }
 
@@ -58,22 +54,6 @@ impl Scene {
     }
 }
 
-fn rays(bounds: &Aabb, n: usize, random: &mut Random) -> Vec<Ray> {
-    let mut rays = Vec::new();
-    for i in 0..n {
-        let scale = if i % 3 == 0 { 3.0 } else { 1.0 };
-        let t_max = if i % 5 == 0 { 0.7 } else { f32::INFINITY };
-        let from = point_inside(bounds, random) * scale;
-        let to = point_inside(bounds, random);
-        rays.push(Ray::new(from, to - from, 0.0, t_max).unwrap());
-    }
-    rays
-}
-
-fn point_inside(bounds: &Aabb, random: &mut Random) -> Vec3 {
-    bounds.min + (bounds.max - bounds.min) * ((random.point() + 1.0) * 0.5)
-}
-
 fn transform(random: &mut Random) -> Affine3A {
     let turn = Quat::from_axis_angle(random.point().normalize(), random.unit() * 6.0);
     let scale = Vec3::splat(random.of(&[0.1, 1.0, 3.0])) * (random.point() * 0.4 + 1.0);
@@ -98,7 +78,12 @@ fn turned_scaled_and_sheared_instances_answer_as_the_flat_scene() {
     let mut hits = 0;
     // Rays that graze a surface may differ by rounding.
     let mut differences = 0;
-    for ray in rays(&flat_tree.root_aabb().unwrap(), 6000, &mut random) {
+    let Aabb { min, max } = flat_tree.root_aabb().unwrap();
+    for i in 0..6000 {
+        let [from, to] = [(); 2].map(|()| min + (max - min) * (random.point() * 0.5 + 0.5));
+        let from = if i % 3 == 0 { from * 3.0 } else { from };
+        let t_max = if i % 5 == 0 { 0.7 } else { f32::INFINITY };
+        let ray = Ray::new(from, to - from, 0.0, t_max).unwrap();
         let found = instances.nearest_hit(&ray);
         let expected = nearest_hit(&flat_tree, &flat, &ray);
         hits += usize::from(expected.is_some());
@@ -124,11 +109,9 @@ fn transforms_without_rounding_give_the_distances_of_the_flat_scene_bit_by_bit()
     let mut random = Random(2);
     let quarter_turn = Mat3A::from_cols(Vec3A::Y, Vec3A::NEG_X, Vec3A::Z);
     let turns = [Mat3A::IDENTITY, quarter_turn * 2.0, -Mat3A::IDENTITY];
-    let mut transforms = Vec::new();
-    for i in 0..40 {
-        let shift = integer_point(30, &mut random);
-        transforms.push(Affine3A::from_mat3_translation(turns[i % 3].into(), shift));
-    }
+    let shift = |_| integer_point(30, &mut random);
+    let moved = |(turn, shift)| Affine3A::from_mat3_translation(Mat3::from(turn), shift);
+    let transforms = turns.into_iter().cycle().zip((0..40).map(shift)).map(moved).collect();
     let scene = scene(vec![grid_box(4), grid_box(2)], transforms, &mut random);
     let (flat, names) = scene.flat();
     let flat_tree = tree(&boxes(&flat), SHAPES[0], &mut random);
@@ -233,7 +216,7 @@ fn every_tree_and_every_kernel_answers_alike_and_filters_see_every_hit() {
 
 /// Returns a point whose coordinates are integers from 0 to `end` − 1.
 fn integer_point(end: usize, random: &mut Random) -> Vec3 {
-    Vec3::new(random.below(end) as f32, random.below(end) as f32, random.below(end) as f32)
+    Vec3::from([(); 3].map(|()| random.below(end) as f32))
 }
 
 #[test]
@@ -273,10 +256,8 @@ fn moved_and_replaced_instances_answer_as_a_new_scene_of_the_same_parts() {
     let parts: Vec<Arc<WideBvh>> = now.parts.iter().cloned().map(Arc::new).collect();
     let mut moving = Instances::new(parts.clone(), vec![], Bvh::default()).unwrap();
     for (frame, transforms) in places.into_iter().enumerate() {
-        now.instances = (0..)
-            .zip(transforms)
-            .map(|(i, transform)| Instance { part: i % 2, transform })
-            .collect();
+        let instance = |(i, transform): (u32, _)| Instance { part: i % 2, transform };
+        now.instances = (0..).zip(transforms).map(instance).collect();
         let expected = now.all(&mut random).remove(0);
         if frame == 1 {
             moving.refit(&now.instances).unwrap();
@@ -291,17 +272,14 @@ fn moved_and_replaced_instances_answer_as_a_new_scene_of_the_same_parts() {
         assert_eq!(moving.refit(&wrong), Err(no_part));
         assert!(moving.replace(&now.instances, Bvh::default()).is_err());
         let rays = rays_of_every_kind(&now.flat().0, &mut random);
+        let nearest: Vec<_> = rays.iter().map(|ray| expected.nearest_hit(ray)).collect();
         let mut hits = vec![InstanceHit { t: 0.0, instance: 0, triangle: 0 }; rays.len()];
         let mut any = vec![false; rays.len()];
         moving.nearest_hits(&rays, &mut hits);
         moving.any_hits(&rays, &mut any);
-        for ((ray, hit), any) in rays.iter().zip(hits).zip(any) {
-            let expected = expected.nearest_hit(ray);
-            assert_eq!(
-                (bits(Some(hit)), any),
-                (bits(expected.or(Some(InstanceHit::MISS))), expected.is_some())
-            );
-        }
+        assert!(any.into_iter().eq(nearest.iter().map(Option::is_some)));
+        let expected = nearest.into_iter().map(|hit| bits(hit.or(Some(InstanceHit::MISS))));
+        assert!(hits.into_iter().map(|hit| bits(Some(hit))).eq(expected));
     }
     for (part, kept) in parts.iter().zip(moving.parts()) {
         assert!(Arc::ptr_eq(part, kept));

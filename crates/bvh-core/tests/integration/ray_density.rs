@@ -16,14 +16,11 @@ fn bounds() -> Aabb {
 
 fn segments(count: usize, seed: u64) -> Vec<Segment> {
     let mut random = Random(seed);
-    let mut segments = Vec::new();
-    for i in 0..count {
-        let [spread_from, spread_to] = if i % 2 == 0 { [1.0, 1.0] } else { [3.0, 1.5] };
-        let from = point(spread_from, &mut random);
-        let to = point(spread_to, &mut random);
-        segments.push(Segment { from, to });
-    }
-    segments
+    let mut segment = |i: usize| {
+        let [from, to] = [[1.0, 1.0], [3.0, 1.5]][i % 2].map(|spread| point(spread, &mut random));
+        Segment { from, to }
+    };
+    (0..count).map(&mut segment).collect()
 }
 
 /// Returns a point of a cube around the middle of the bounds, `spread` times as large.
@@ -52,18 +49,14 @@ fn boxes_on_the_grid_are_entered_as_often_as_segments_meet_them() {
     let density = RayDensity::of_rays(&bounds(), &segments, 0.0).unwrap();
     let mut random = Random(2);
     for _ in 0..2000 {
-        let a = [0, 1, 2].map(|_| random.below(33) as f32);
-        let b = [0, 1, 2].map(|_| random.below(33) as f32);
+        let [a, b] = [(); 2].map(|()| [(); 3].map(|()| random.below(33) as f32));
         let cells = around(a, b);
         // Only boxes of at least one cell along every axis.
         if cells.extent().min_element() == 0.0 {
             continue;
         }
-        let mut counted = 0;
-        for segment in &segments {
-            counted += u32::from(meets(segment, &cells));
-        }
-        assert_eq!(density.entries(&cells), f64::from(counted), "{cells:?}");
+        let counted = segments.iter().filter(|segment| meets(segment, &cells)).count();
+        assert_eq!(density.entries(&cells), counted as f64, "{cells:?}");
     }
     assert_eq!(density.measure(&bounds()), bounds().half_area());
 }
@@ -80,18 +73,11 @@ fn corner() -> impl Strategy<Value = [f32; 3]> {
 /// Returns one of nine densities, of three samples with three weights of area. They are made once.
 fn density(sample: usize, share: usize) -> &'static RayDensity {
     static DENSITIES: OnceLock<Vec<RayDensity>> = OnceLock::new();
-    &DENSITIES.get_or_init(all_densities)[3 * sample + share]
-}
-
-fn all_densities() -> Vec<RayDensity> {
-    let mut densities = Vec::new();
-    for seed in 0..3 {
-        for area_weight in [0.0, 0.1, 1.0] {
-            densities
-                .push(RayDensity::of_rays(&bounds(), &segments(200, seed), area_weight).unwrap());
-        }
-    }
-    densities
+    let make = |i: usize| {
+        let segments = segments(200, i as u64 / 3);
+        RayDensity::of_rays(&bounds(), &segments, [0.0, 0.1, 1.0][i % 3]).unwrap()
+    };
+    &DENSITIES.get_or_init(|| (0..9).map(make).collect())[3 * sample + share]
 }
 
 proptest! {
@@ -117,20 +103,15 @@ fn each_invalid_input_has_its_error() {
     let one = [Segment { from: [1.0; 3], to: [2.0; 3] }];
     let nan = [one[0], Segment { from: [f32::NAN; 3], to: [2.0; 3] }];
     let far = [Segment { from: [100.0; 3], to: [200.0; 3] }];
-    assert_eq!(
-        RayDensity::of_rays(&bounds(), &nan, 0.1).unwrap_err(),
-        DensityError::NotFinite { index: 1 }
-    );
-    assert_eq!(
-        RayDensity::of_rays(&bounds(), &[], 0.1).unwrap_err(),
-        DensityError::Count { segments: 0 }
-    );
-    assert_eq!(RayDensity::of_rays(&bounds(), &far, 0.1).unwrap_err(), DensityError::NoneMeets);
-    assert_eq!(
-        RayDensity::of_rays(&bounds(), &one, -0.1).unwrap_err(),
-        DensityError::AreaWeight(-0.1)
-    );
-    assert_eq!(RayDensity::of_rays(&Aabb::EMPTY, &one, 0.1).unwrap_err(), DensityError::Bounds);
+    for (bounds, rays, area_weight, error) in [
+        (bounds(), &nan[..], 0.1, DensityError::NotFinite { index: 1 }),
+        (bounds(), &[], 0.1, DensityError::Count { segments: 0 }),
+        (bounds(), &far, 0.1, DensityError::NoneMeets),
+        (bounds(), &one, -0.1, DensityError::AreaWeight(-0.1)),
+        (Aabb::EMPTY, &one, 0.1, DensityError::Bounds),
+    ] {
+        assert_eq!(RayDensity::of_rays(&bounds, rays, area_weight).unwrap_err(), error);
+    }
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! Points are inside of meshes, closed or not, exactly where the sum over all triangles says so.
 
 use crate::support::layouts::divided;
-use crate::support::{Random, SHAPES, ball, boxes, closed_meshes, grid_box, scaled, soup, tree};
+use crate::support::{
+    Random, SHAPES, ball, boxes, closed_meshes, grid_box, mapped, scaled, soup, tree,
+};
 use InsideRule::{Auto, Parity, Winding};
 use bvh_core::{Aabb, Bvh, InsideRule, Node, Solid, Triangle, WideBvh};
 use glam::Vec3;
@@ -11,9 +13,13 @@ use std::f64::consts::TAU;
 /// Returns which points are inside, by a tree of some shape.
 fn contains(triangles: &[Triangle], shape: usize, points: &[Vec3], rule: InsideRule) -> Vec<bool> {
     let tree = tree(&boxes(triangles), SHAPES[shape], &mut Random(5));
-    let wide = WideBvh::new(&tree, triangles).unwrap();
+    contains_by(&tree, triangles, points, rule)
+}
+
+fn contains_by(tree: &Bvh, triangles: &[Triangle], points: &[Vec3], rule: InsideRule) -> Vec<bool> {
+    let wide = WideBvh::new(tree, triangles).unwrap();
     let mut inside = vec![false; points.len()];
-    Solid::new(&tree, triangles).contains(&wide, points, rule, &mut inside);
+    Solid::new(tree, triangles).contains(&wide, points, rule, &mut inside);
     inside
 }
 
@@ -63,7 +69,7 @@ fn inside_out(triangles: Vec<Triangle>) -> Vec<Triangle> {
 }
 
 fn moved(triangles: &[Triangle], by: Vec3) -> Vec<Triangle> {
-    triangles.iter().map(|triangle| Triangle(triangle.0.map(|corner| corner + by))).collect()
+    mapped(triangles, |corner| corner + by)
 }
 
 /// Returns meshes with holes or overlaps, and whether they are watertight.
@@ -168,10 +174,7 @@ fn of_eight_boxes_with_common_faces_one_contains_each_point_of_them() {
 #[test]
 fn a_zero_with_a_sign_opens_no_mesh() {
     let mesh = moved(&outward(grid_box(1)), Vec3::ONE);
-    let negated: Vec<Triangle> = (mesh.iter().enumerate())
-        .map(|(i, t)| Triangle(t.0.map(|p| if i % 2 == 0 { p } else { p - 0.0 * p })))
-        .map(|t| Triangle(t.0.map(|p| Vec3::select(p.cmpeq(Vec3::ZERO), -Vec3::ZERO, p))))
-        .collect();
+    let negated = mapped(&mesh, |p| Vec3::select(p.cmpeq(Vec3::ZERO), -Vec3::ZERO, p));
     let mixed = [&mesh[..5], &negated[5..]].concat();
     assert!(is_watertight(&mixed));
     assert!(!is_watertight(&mixed[1..]));
@@ -181,7 +184,7 @@ fn a_zero_with_a_sign_opens_no_mesh() {
 fn a_divided_triangle_counts_once() {
     let triangles = outward(ball(2))[3..].to_vec();
     let count = triangles.len() as u32;
-    let all = boxes(&triangles).iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+    let all = Aabb::union_of(&boxes(&triangles));
     let halves = Bvh::new(
         vec![Node::inner(all, 1, 2), Node::leaf(all, 0, count), Node::leaf(all, count, count)],
         (0..count).chain(0..count).collect(),
@@ -196,10 +199,7 @@ fn a_divided_triangle_counts_once() {
     let expected = contains(&triangles, 0, &points, Winding);
     assert!(expected.contains(&true));
     for tree in [halves, parts] {
-        let wide = WideBvh::new(&tree, &triangles).unwrap();
-        let mut inside = vec![false; points.len()];
-        Solid::new(&tree, &triangles).contains(&wide, &points, Winding, &mut inside);
-        assert_eq!(inside, expected);
+        assert_eq!(contains_by(&tree, &triangles, &points, Winding), expected);
     }
 }
 

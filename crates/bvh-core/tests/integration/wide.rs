@@ -3,8 +3,8 @@
 
 use crate::support::layouts::{Traced, bundles, rays_on_planes};
 use crate::support::{
-    Random, SHAPES, all_of, ball, bits, boxes, brute_force, chain, grid_box, junction, rays,
-    scaled, soup, tree,
+    Random, SHAPES, all_of, ball, bits, boxes, brute_force, chain, grid_box, junction, mapped,
+    rays, scaled, soup, tree,
 };
 use bvh_core::{
     Aabb, Bvh, Coherence, Hit, InFrame, Node, Orientation, PreparedRay, Ray, RefitError, Select,
@@ -254,10 +254,8 @@ fn distances_that_underflow_are_answered_alike() {
                 for z in [0.0, -1e-30, 1e-45, 2e-38, 1e-20] {
                     for slope in [0.0, 0.1, 1e-30] {
                         let direction = Vec3::new(slope, slope, side) * length;
-                        rays.push(
-                            Ray::new(Vec3::new(0.1, 0.2, -side * z), direction, t_min, t_max)
-                                .unwrap(),
-                        );
+                        let origin = Vec3::new(0.1, 0.2, -side * z);
+                        rays.push(Ray::new(origin, direction, t_min, t_max).unwrap());
                     }
                 }
             }
@@ -301,16 +299,13 @@ fn a_refitted_layout_answers_as_brute_force_at_the_new_places() {
 fn a_refitted_layout_costs_no_less_than_a_new_one_of_the_refitted_tree() {
     let mut random = Random(8);
     let triangles = ball(3);
-    let moved: Vec<Triangle> = (triangles.iter())
-        .map(|t| Triangle(t.0.map(|p| Vec3::new(p.x * 4.0, p.y + p.x * p.z, p.z * 0.1))))
-        .collect();
+    let moved = mapped(&triangles, |p| Vec3::new(p.x * 4.0, p.y + p.x * p.z, p.z * 0.1));
     let mut tree = tree(&boxes(&triangles), SHAPES[0], &mut random);
     let mut layout = WideBvh::new(&tree, &triangles).unwrap();
     layout.refit(&moved).unwrap();
     tree.refit(&boxes(&moved));
-    let new = WideBvh::new(&tree, &moved).unwrap();
+    let new = WideBvh::new(&tree, &moved).unwrap().expected_visits();
     let refitted = layout.expected_visits();
-    let new = new.expected_visits();
     assert!(refitted > new && refitted < 2.0 * new, "{refitted} {new}");
 }
 
@@ -329,9 +324,7 @@ fn a_layout_whose_triangles_cannot_be_followed_says_so_and_stays_as_it_was() {
     let infinite = Triangle([Vec3::X, Vec3::Y, Vec3::INFINITY]);
     // Beyond f32 along the axes of a turned frame.
     let mut turned = Traced::framed(&triangles, DMat3::from_rotation_z(-0.785), &mut random);
-    let far = 2.9e38 * (Vec3::X + Vec3::Y);
-    let far = triangles.iter().map(|t| Triangle(t.0.map(|p| far + p * 5e36)));
-    let far: Vec<Triangle> = far.collect();
+    let far = mapped(&triangles, |p| 2.9e38 * (Vec3::X + Vec3::Y) + p * 5e36);
     for (_, layout) in &mut turned.layouts {
         assert_eq!(layout.refit(&far), Err(RefitError::NotFinite(0)));
     }
@@ -366,7 +359,7 @@ fn rays_whose_distances_from_planes_overflow_are_answered_alike() {
     let mut random = Random(23);
     let size = libm::exp2f(127.0);
     let mut hits = 0;
-    let aside = scaled(&grid_box(3), 0.25).iter().map(|t| Triangle(t.0.map(|p| p - 1.5))).collect();
+    let aside = mapped(&grid_box(3), |p| p * 0.25 - 1.5);
     for (name, scene) in [("grid", grid_box(3)), ("ball", ball(2)), ("aside", aside)] {
         let triangles = scaled(&scene, size);
         let traced = Traced::all(&triangles, &mut random);
@@ -392,17 +385,11 @@ fn every_kernel_traces_trees_of_any_depth() {
     let mut random = Random(21);
     // Boxes inside boxes, so that a ray enters all of them and the stack is as full as can be; and
     // boxes one behind the other.
-    let nested = |i: usize| (i + 1) as f32;
-    let nested: Vec<Triangle> = (0..3000)
-        .map(|i| {
-            Triangle([Vec3::NEG_ONE, Vec3::X, Vec3::new(0.0, 1.0, 0.25)].map(|p| p * nested(i)))
-        })
-        .collect();
-    let shifted = |i: usize, p: Vec3| p * (i + 1) as f32 + Vec3::Z * (i as f32);
-    let row: Vec<Triangle> = (0..3000)
-        .map(|i| Triangle([Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| shifted(i, p))))
-        .collect();
-    for (name, triangles) in [("nested", nested), ("in a row", row)] {
+    let nested = [Vec3::NEG_ONE, Vec3::X, Vec3::new(0.0, 1.0, 0.25)];
+    let row = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    for (name, first, step) in [("nested", nested, Vec3::ZERO), ("in a row", row, Vec3::Z)] {
+        let grown = |i: usize| Triangle(first.map(|p| p * (i + 1) as f32 + step * i as f32));
+        let triangles: Vec<Triangle> = (0..3000).map(grown).collect();
         let traced = [Traced::new(chain(&boxes(&triangles)), &triangles)];
         let mut rays: Vec<Ray> = (0..150)
             .map(|_| {

@@ -5,7 +5,7 @@
 #![allow(clippy::undocumented_unsafe_blocks, unused_unsafe)]
 
 use super::registers::*;
-use crate::wide::lanes::{DoubleLanes, Lanes, Mask};
+use crate::wide::lanes::{DoubleLanes, Lanes, Mask, functions};
 use core::array::from_fn;
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 
@@ -37,8 +37,8 @@ macro_rules! operators {
     )*};
 }
 
-/// Functions, an expression per register.
-macro_rules! functions {
+/// Functions of numbers, an expression per register.
+macro_rules! by_register {
     ($($name:ident($a:ident $(, $b:ident)*) = $value:expr;)*) => {$(
         #[inline(always)]
         fn $name(self, $($b: Self),*) -> Self {
@@ -66,7 +66,7 @@ impl<const R: usize> Lanes for Singles<R> {
     type Mask = Self;
     type Double = Doubles<R>;
 
-    functions! {
+    by_register! {
         min(a, b) = select(a, b, lt(a, b));
         max(a, b) = select(a, b, lt(b, a));
         mul_add(a, b, c) = mul_add(a, b, c);
@@ -104,11 +104,6 @@ impl<const R: usize> Lanes for Singles<R> {
     }
 
     #[inline(always)]
-    fn signs(self) -> u32 {
-        (0..R).fold(0, |bits, i| bits | unsafe { signs(self.0[i]) } << (4 * i))
-    }
-
-    #[inline(always)]
     fn greatest(self) -> f32 {
         let four = self.0.map(|register| Singles([register]));
         let four = four.into_iter().fold(four[0], Lanes::max);
@@ -119,34 +114,22 @@ impl<const R: usize> Lanes for Singles<R> {
         greatest[0]
     }
 
-    #[inline(always)]
-    fn select(mask: Self, yes: Self, no: Self) -> Self {
-        Self(from_fn(|i| unsafe { select(yes.0[i], no.0[i], mask.0[i]) }))
-    }
-
-    #[inline(always)]
-    fn double(self) -> Doubles<R> {
-        Doubles(self.0.map(|a| unsafe { [double_low(a), double_high(a)] }))
-    }
-
-    #[inline(always)]
-    fn single(double: Doubles<R>) -> Self {
-        Self(double.0.map(|[low, high]| unsafe { single(low, high) }))
-    }
-
-    /// Masks of f64 are narrow from the beginning.
-    #[inline(always)]
-    fn narrow(mask: Self) -> Self {
-        mask
-    }
-
-    #[inline(always)]
-    fn transpose_quarters([a, b, c, d]: [Self; 4]) -> [Self; 4] {
-        let ac = a.interleaved(c);
-        let bd = b.interleaved(d);
-        let [first, second] = ac[0].interleaved(bd[0]);
-        let [third, fourth] = ac[1].interleaved(bd[1]);
-        [first, second, third, fourth]
+    functions! {
+        fn signs(self) -> u32 = (0..R).fold(0, |bits, i| bits | signs(self.0[i]) << (4 * i));
+        fn select(mask: Self, yes: Self, no: Self) -> Self =
+            Self(from_fn(|i| select(yes.0[i], no.0[i], mask.0[i])));
+        fn double(self) -> Doubles<R> = Doubles(self.0.map(|a| [double_low(a), double_high(a)]));
+        fn single(double: Doubles<R>) -> Self =
+            Self(double.0.map(|[low, high]| single(low, high)));
+        // Masks of f64 are narrow from the beginning.
+        fn narrow(mask: Self) -> Self = mask;
+        fn transpose_quarters([a, b, c, d]: [Self; 4]) -> [Self; 4] = {
+            let ac = a.interleaved(c);
+            let bd = b.interleaved(d);
+            let [first, second] = ac[0].interleaved(bd[0]);
+            let [third, fourth] = ac[1].interleaved(bd[1]);
+            [first, second, third, fourth]
+        };
     }
 
     #[inline(always)]
@@ -168,9 +151,8 @@ impl<const R: usize> Singles<R> {
 }
 
 impl<const R: usize> Mask for Singles<R> {
-    #[inline(always)]
-    fn bits(self) -> u32 {
-        self.signs()
+    functions! {
+        fn bits(self) -> u32 = self.signs();
     }
 
     #[inline(always)]
@@ -207,20 +189,6 @@ impl<const R: usize> DoubleLanes for Doubles<R> {
         Self(from_fn(|i| from_fn(|half| at(i, half))))
     }
 
-    /// By Dekker, since products are not fused.
-    #[inline(always)]
-    fn two_product(self, other: Self) -> (Self, Self) {
-        let split = |x: Self| {
-            let scaled = x.filled(((1_u64 << 27) + 1) as f64) * x;
-            let high = scaled - (scaled - x);
-            (high, x - high)
-        };
-        let product = self * other;
-        let (a, a_low) = split(self);
-        let (b, b_low) = split(other);
-        (product, a * b - product + a * b_low + a_low * b + a_low * b_low)
-    }
-
     #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
         for (i, half) in self.0.as_flattened().iter().enumerate() {
@@ -228,52 +196,35 @@ impl<const R: usize> DoubleLanes for Doubles<R> {
         }
     }
 
-    #[inline(always)]
-    fn select(mask: Singles<R>, yes: Self, no: Self) -> Self {
-        // Twice the mask of 32 bits is the mask of 64.
-        let [low, high] = mask.interleaved(mask);
-        Self(from_fn(|i| unsafe {
-            let low = widen(low.0[i]);
-            let high = widen(high.0[i]);
-            [
-                select_double(yes.0[i][0], no.0[i][0], low),
-                select_double(yes.0[i][1], no.0[i][1], high),
-            ]
-        }))
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| unsafe { select_double(a, b, lt_double(a, b)) })
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| unsafe { select_double(a, b, lt_double(b, a)) })
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        self * factor + term
-    }
-
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, term: Self) -> Self {
-        self * factor - term
-    }
-
-    #[inline(always)]
-    fn lt(self, other: Self) -> Singles<R> {
-        self.zip(other, |a, b| unsafe { lt_double(a, b) }).narrowed()
-    }
-
-    #[inline(always)]
-    fn le(self, other: Self) -> Singles<R> {
-        self.zip(other, |a, b| unsafe { le_double(a, b) }).narrowed()
-    }
-
-    #[inline(always)]
-    fn eq(self, other: Self) -> Singles<R> {
-        self.zip(other, |a, b| unsafe { eq_double(a, b) }).narrowed()
+    functions! {
+        // By Dekker, since products are not fused.
+        fn two_product(self, other: Self) -> (Self, Self) = {
+            let split = |x: Self| {
+                let scaled = x.filled(((1_u64 << 27) + 1) as f64) * x;
+                let high = scaled - (scaled - x);
+                (high, x - high)
+            };
+            let product = self * other;
+            let (a, a_low) = split(self);
+            let (b, b_low) = split(other);
+            (product, a * b - product + a * b_low + a_low * b + a_low * b_low)
+        };
+        fn select(mask: Singles<R>, yes: Self, no: Self) -> Self = {
+            // Twice the mask of 32 bits is the mask of 64.
+            let [low, high] = mask.interleaved(mask);
+            Self(from_fn(|i| {
+                [
+                    select_double(yes.0[i][0], no.0[i][0], widen(low.0[i])),
+                    select_double(yes.0[i][1], no.0[i][1], widen(high.0[i])),
+                ]
+            }))
+        };
+        fn min(self, b: Self) -> Self = self.zip(b, |a, b| select_double(a, b, lt_double(a, b)));
+        fn max(self, b: Self) -> Self = self.zip(b, |a, b| select_double(a, b, lt_double(b, a)));
+        fn mul_add(self, factor: Self, term: Self) -> Self = self * factor + term;
+        fn mul_sub(self, factor: Self, term: Self) -> Self = self * factor - term;
+        fn lt(self, b: Self) -> Singles<R> = self.zip(b, |a, b| lt_double(a, b)).narrowed();
+        fn le(self, b: Self) -> Singles<R> = self.zip(b, |a, b| le_double(a, b)).narrowed();
+        fn eq(self, b: Self) -> Singles<R> = self.zip(b, |a, b| eq_double(a, b)).narrowed();
     }
 }

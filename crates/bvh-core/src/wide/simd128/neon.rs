@@ -15,89 +15,45 @@ pub(super) use core::arch::aarch64::{
     vsubq_f64 as subtract_double, vzip1q_f32 as interleave_low, vzip2q_f32 as interleave_high,
 };
 
-/// Functions of two registers that are one instruction between other types of registers.
+/// Functions that are one expression each.
 macro_rules! functions {
-    ($($name:ident($register:ident) $instruction:ident,)*) => {$(
+    ($($(#[$doc:meta])* fn $name:ident($($a:ident: $of:ty),*) -> $result:ty = $value:expr;)*) => {$(
+        $(#[$doc])*
         #[inline(always)]
-        pub(super) unsafe fn $name(a: $register, b: $register) -> $register {
+        pub(super) unsafe fn $name($($a: $of),*) -> $result {
             // SAFETY: the target has NEON; all registers are 128 bits, any of which are a value.
-            unsafe { transmute($instruction(transmute(a), transmute(b))) }
+            unsafe { $value }
         }
     )*};
 }
 
 functions! {
-    and(Single) vandq_u32,
-    or(Single) vorrq_u32,
-    xor(Single) veorq_u32,
-    lt(Single) vcltq_f32,
-    le(Single) vcleq_f32,
-    eq(Single) vceqq_f32,
-    below(Single) vcltq_u32,
-    lt_double(Double) vcltq_f64,
-    le_double(Double) vcleq_f64,
-    eq_double(Double) vceqq_f64,
-}
-
-// SAFETY, below: the target has NEON; all registers are 128 bits, any of which are a value.
-
-#[inline(always)]
-pub(super) unsafe fn select(yes: Single, no: Single, mask: Single) -> Single {
-    // SAFETY: as above.
-    unsafe { vbslq_f32(transmute(mask), yes, no) }
-}
-
-#[inline(always)]
-pub(super) unsafe fn select_double(yes: Double, no: Double, mask: Double) -> Double {
-    // SAFETY: as above.
-    unsafe { vbslq_f64(transmute(mask), yes, no) }
-}
-
-/// The mask of 64 bits whose halves are masks of 32 bits.
-#[inline(always)]
-pub(super) unsafe fn widen(mask: Single) -> Double {
-    // SAFETY: as above.
-    unsafe { transmute(mask) }
-}
-
-#[inline(always)]
-pub(super) unsafe fn mul_add(a: Single, b: Single, c: Single) -> Single {
-    // SAFETY: as above.
-    unsafe { vfmaq_f32(c, a, b) }
-}
-
-#[inline(always)]
-pub(super) unsafe fn swap_twos(a: Single) -> Single {
-    // SAFETY: as above.
-    unsafe { vextq_f32::<2>(a, a) }
-}
-
-/// Returns a bit per lane whose sign is set.
-#[inline(always)]
-pub(super) unsafe fn signs(a: Single) -> u32 {
-    // SAFETY: as above.
-    unsafe {
+    fn and(a: Single, b: Single) -> Single = transmute(vandq_u32(transmute(a), transmute(b)));
+    fn or(a: Single, b: Single) -> Single = transmute(vorrq_u32(transmute(a), transmute(b)));
+    fn xor(a: Single, b: Single) -> Single = transmute(veorq_u32(transmute(a), transmute(b)));
+    fn below(a: Single, b: Single) -> Single = transmute(vcltq_u32(transmute(a), transmute(b)));
+    fn lt(a: Single, b: Single) -> Single = transmute(vcltq_f32(a, b));
+    fn le(a: Single, b: Single) -> Single = transmute(vcleq_f32(a, b));
+    fn eq(a: Single, b: Single) -> Single = transmute(vceqq_f32(a, b));
+    fn lt_double(a: Double, b: Double) -> Double = transmute(vcltq_f64(a, b));
+    fn le_double(a: Double, b: Double) -> Double = transmute(vcleq_f64(a, b));
+    fn eq_double(a: Double, b: Double) -> Double = transmute(vceqq_f64(a, b));
+    fn select(yes: Single, no: Single, mask: Single) -> Single = vbslq_f32(transmute(mask), yes, no);
+    fn select_double(yes: Double, no: Double, mask: Double) -> Double =
+        vbslq_f64(transmute(mask), yes, no);
+    /// The mask of 64 bits whose halves are masks of 32 bits.
+    fn widen(mask: Single) -> Double = transmute(mask);
+    fn mul_add(a: Single, b: Single, c: Single) -> Single = vfmaq_f32(c, a, b);
+    fn swap_twos(a: Single) -> Single = vextq_f32::<2>(a, a);
+    /// Returns a bit per lane whose sign is set.
+    fn signs(a: Single) -> u32 = {
         let signs = vshrq_n_u32::<31>(transmute(a));
         vaddvq_u32(vshlq_u32(signs, transmute([0, 1, 2, 3])))
-    }
-}
-
-#[inline(always)]
-pub(super) unsafe fn double_low(a: Single) -> Double {
-    // SAFETY: as above.
-    unsafe { vcvt_f64_f32(vget_low_f32(a)) }
-}
-
-/// The numbers of two registers, rounded.
-#[inline(always)]
-pub(super) unsafe fn single(low: Double, high: Double) -> Single {
-    // SAFETY: as above.
-    unsafe { vcvt_high_f32_f64(vcvt_f32_f64(low), high) }
-}
-
-/// The mask of four numbers from the masks of two and two.
-#[inline(always)]
-pub(super) unsafe fn narrow(low: Double, high: Double) -> Single {
-    // SAFETY: as above.
-    unsafe { transmute(vcombine_u32(vmovn_u64(transmute(low)), vmovn_u64(transmute(high)))) }
+    };
+    fn double_low(a: Single) -> Double = vcvt_f64_f32(vget_low_f32(a));
+    /// The numbers of two registers, rounded.
+    fn single(low: Double, high: Double) -> Single = vcvt_high_f32_f64(vcvt_f32_f64(low), high);
+    /// The mask of four numbers from the masks of two and two.
+    fn narrow(low: Double, high: Double) -> Single =
+        transmute(vcombine_u32(vmovn_u64(transmute(low)), vmovn_u64(transmute(high))));
 }

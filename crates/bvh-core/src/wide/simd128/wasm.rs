@@ -13,81 +13,41 @@ pub(super) use core::arch::wasm32::{
     v128_or as or, v128_xor as xor,
 };
 
-#[inline(always)]
-pub(super) unsafe fn load(from: *const f32) -> v128 {
-    // SAFETY: the place has four lanes; the instruction accepts any alignment.
-    unsafe { v128_load(from.cast()) }
+/// Functions that are one expression each.
+macro_rules! functions {
+    ($($(#[$doc:meta])* fn $name:ident($($a:ident: $of:ty),*) -> $result:ty = $value:expr;)*) => {$(
+        $(#[$doc])*
+        #[inline(always)]
+        pub(super) unsafe fn $name($($a: $of),*) -> $result {
+            // SAFETY: places have as many numbers as the register; their instructions accept any
+            // alignment, and all others are safe.
+            #[allow(unused_unsafe)]
+            unsafe {
+                $value
+            }
+        }
+    )*};
 }
 
-#[inline(always)]
-pub(super) unsafe fn load_double(from: *const f64) -> v128 {
-    // SAFETY: the place has two numbers; the instruction accepts any alignment.
-    unsafe { v128_load(from.cast()) }
-}
-
-#[inline(always)]
-pub(super) unsafe fn store(to: *mut f32, a: v128) {
-    // SAFETY: the place has four lanes; the instruction accepts any alignment.
-    unsafe { v128_store(to.cast(), a) }
-}
-
-#[inline(always)]
-pub(super) unsafe fn store_double(to: *mut f64, a: v128) {
-    // SAFETY: the place has four lanes; the instruction accepts any alignment.
-    unsafe { v128_store(to.cast(), a) }
-}
-
-/// The mask of 64 bits whose halves are masks of 32 bits.
-#[inline(always)]
-pub(super) fn widen(mask: v128) -> v128 {
-    mask
-}
-
-/// Rounded twice: there is no fused operation.
-#[inline(always)]
-pub(super) fn mul_add(a: v128, b: v128, c: v128) -> v128 {
-    f32x4_add(f32x4_mul(a, b), c)
-}
-
-#[inline(always)]
-pub(super) fn interleave_low(a: v128, b: v128) -> v128 {
-    i32x4_shuffle::<0, 4, 1, 5>(a, b)
-}
-
-#[inline(always)]
-pub(super) fn interleave_high(a: v128, b: v128) -> v128 {
-    i32x4_shuffle::<2, 6, 3, 7>(a, b)
-}
-
-#[inline(always)]
-pub(super) fn swap_twos(a: v128) -> v128 {
-    i32x4_shuffle::<2, 3, 0, 1>(a, a)
-}
-
-#[inline(always)]
-pub(super) fn swap_ones(a: v128) -> v128 {
-    i32x4_shuffle::<1, 0, 3, 2>(a, a)
-}
-
-/// Returns a bit per lane whose sign is set.
-#[inline(always)]
-pub(super) fn signs(a: v128) -> u32 {
-    u32::from(i32x4_bitmask(a))
-}
-
-#[inline(always)]
-pub(super) fn double_high(a: v128) -> v128 {
-    f64x2_promote_low_f32x4(swap_twos(a))
-}
-
-/// The numbers of two registers, rounded.
-#[inline(always)]
-pub(super) fn single(low: v128, high: v128) -> v128 {
-    i32x4_shuffle::<0, 1, 4, 5>(f32x4_demote_f64x2_zero(low), f32x4_demote_f64x2_zero(high))
-}
-
-/// The mask of four numbers from the masks of two and two.
-#[inline(always)]
-pub(super) fn narrow(low: v128, high: v128) -> v128 {
-    i32x4_shuffle::<0, 2, 4, 6>(low, high)
+functions! {
+    fn load(from: *const f32) -> v128 = v128_load(from.cast());
+    fn load_double(from: *const f64) -> v128 = v128_load(from.cast());
+    fn store(to: *mut f32, a: v128) -> () = v128_store(to.cast(), a);
+    fn store_double(to: *mut f64, a: v128) -> () = v128_store(to.cast(), a);
+    /// The mask of 64 bits whose halves are masks of 32 bits.
+    fn widen(mask: v128) -> v128 = mask;
+    /// Rounded twice: there is no fused operation.
+    fn mul_add(a: v128, b: v128, c: v128) -> v128 = f32x4_add(f32x4_mul(a, b), c);
+    fn interleave_low(a: v128, b: v128) -> v128 = i32x4_shuffle::<0, 4, 1, 5>(a, b);
+    fn interleave_high(a: v128, b: v128) -> v128 = i32x4_shuffle::<2, 6, 3, 7>(a, b);
+    fn swap_twos(a: v128) -> v128 = i32x4_shuffle::<2, 3, 0, 1>(a, a);
+    fn swap_ones(a: v128) -> v128 = i32x4_shuffle::<1, 0, 3, 2>(a, a);
+    /// Returns a bit per lane whose sign is set.
+    fn signs(a: v128) -> u32 = u32::from(i32x4_bitmask(a));
+    fn double_high(a: v128) -> v128 = f64x2_promote_low_f32x4(swap_twos(a));
+    /// The numbers of two registers, rounded.
+    fn single(low: v128, high: v128) -> v128 =
+        i32x4_shuffle::<0, 1, 4, 5>(f32x4_demote_f64x2_zero(low), f32x4_demote_f64x2_zero(high));
+    /// The mask of four numbers from the masks of two and two.
+    fn narrow(low: v128, high: v128) -> v128 = i32x4_shuffle::<0, 2, 4, 6>(low, high);
 }

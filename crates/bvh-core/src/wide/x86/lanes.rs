@@ -5,7 +5,7 @@
 
 #![allow(clippy::undocumented_unsafe_blocks)]
 
-use crate::wide::lanes::{DoubleLanes, Lanes, Mask};
+use crate::wide::lanes::{DoubleLanes, Lanes, Mask, functions};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 
@@ -22,33 +22,19 @@ macro_rules! operators {
     )*};
 }
 
-/// Functions of two registers or three, each one expression.
-macro_rules! functions {
-    ($($name:ident($lanes:ident $(, $argument:ident)*) -> $result:ty = $value:expr;)*) => {$(
-        #[inline(always)]
-        fn $name(self, $($argument: Self),*) -> $result {
-            let $lanes = self;
-            #[allow(unused_unsafe)]
-            unsafe {
-                $value
-            }
-        }
-    )*};
-}
-
 /// Loads and stores of a register, and the fill of all its lanes.
 macro_rules! memory {
-    ($splat:ident $load:ident $store:ident) => {
+    ($number:ident: $splat:ident $load:ident $store:ident) => {
         #[inline(always)]
-        unsafe fn splat(x: f32) -> Self {
+        unsafe fn splat(x: $number) -> Self {
             unsafe { Self($splat(x)) }
         }
         #[inline(always)]
-        unsafe fn load(from: *const f32) -> Self {
+        unsafe fn load(from: *const $number) -> Self {
             unsafe { Self($load(from)) }
         }
         #[inline(always)]
-        unsafe fn store(self, to: *mut f32) {
+        unsafe fn store(self, to: *mut $number) {
             unsafe { $store(to, self.0) }
         }
     };
@@ -122,7 +108,7 @@ impl Lanes for F32x4 {
     const N: usize = 4;
     type Mask = Self;
     type Double = F64x4;
-    memory!(_mm_set1_ps _mm_load_ps _mm_storeu_ps);
+    memory!(f32: _mm_set1_ps _mm_load_ps _mm_storeu_ps);
     #[inline(always)]
     unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
         unsafe { Self::load(from[0]) }
@@ -133,41 +119,32 @@ impl Lanes for F32x4 {
     }
     quarters!(_mm_unpacklo_ps _mm_unpackhi_ps _mm_shuffle_ps _mm_permute_ps);
     functions! {
-        min(a, b) -> Self = Self(_mm_min_ps(a.0, b.0));
-        max(a, b) -> Self = Self(_mm_max_ps(a.0, b.0));
-        mul_add(a, b, c) -> Self = Self(_mm_fmadd_ps(a.0, b.0, c.0));
-        mul_sub(a, b, c) -> Self = Self(_mm_fmsub_ps(a.0, b.0, c.0));
-        lt(a, b) -> Self = Self(_mm_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> Self = Self(_mm_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> Self = Self(_mm_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
-        signs(a) -> u32 = _mm_movemask_ps(a.0) as u32;
-        double(a) -> F64x4 = F64x4(_mm256_cvtps_pd(a.0));
-        greatest(a) -> f32 = {
-            let two = _mm_max_ps(a.0, _mm_movehl_ps(a.0, a.0));
+        fn min(self, b: Self) -> Self = Self(_mm_min_ps(self.0, b.0));
+        fn max(self, b: Self) -> Self = Self(_mm_max_ps(self.0, b.0));
+        fn mul_add(self, b: Self, c: Self) -> Self = Self(_mm_fmadd_ps(self.0, b.0, c.0));
+        fn mul_sub(self, b: Self, c: Self) -> Self = Self(_mm_fmsub_ps(self.0, b.0, c.0));
+        fn lt(self, b: Self) -> Self = Self(_mm_cmp_ps::<_CMP_LT_OQ>(self.0, b.0));
+        fn le(self, b: Self) -> Self = Self(_mm_cmp_ps::<_CMP_LE_OQ>(self.0, b.0));
+        fn eq(self, b: Self) -> Self = Self(_mm_cmp_ps::<_CMP_EQ_OQ>(self.0, b.0));
+        fn signs(self) -> u32 = _mm_movemask_ps(self.0) as u32;
+        fn double(self) -> F64x4 = F64x4(_mm256_cvtps_pd(self.0));
+        fn greatest(self) -> f32 = {
+            let two = _mm_max_ps(self.0, _mm_movehl_ps(self.0, self.0));
             _mm_cvtss_f32(_mm_max_ss(two, _mm_permute_ps::<0b01>(two)))
         };
-        below(a, b) -> Self = {
-            let a = _mm_castps_si128(a.0);
+        fn below(self, b: Self) -> Self = {
+            let a = _mm_castps_si128(self.0);
             let b = _mm_castps_si128(b.0);
             let not_below = _mm_cmpeq_epi32(_mm_max_epu32(a, b), a);
             Self(_mm_castsi128_ps(_mm_xor_si128(not_below, _mm_set1_epi32(-1))))
         };
-    }
-    #[inline(always)]
-    fn select(mask: Self, yes: Self, no: Self) -> Self {
-        unsafe { Self(_mm_blendv_ps(no.0, yes.0, mask.0)) }
-    }
-    #[inline(always)]
-    fn single(double: F64x4) -> Self {
-        unsafe { Self(_mm256_cvtpd_ps(double.0)) }
-    }
-    #[inline(always)]
-    fn narrow(mask: F64x4) -> Self {
-        unsafe {
+        fn select(mask: Self, yes: Self, no: Self) -> Self = Self(_mm_blendv_ps(no.0, yes.0, mask.0));
+        fn single(double: F64x4) -> Self = Self(_mm256_cvtpd_ps(double.0));
+        fn narrow(mask: F64x4) -> Self = {
             let mask = _mm256_castpd_ps(mask.0);
             let high = _mm256_extractf128_ps::<1>(mask);
             Self(_mm_shuffle_ps::<0b10_00_10_00>(_mm256_castps256_ps128(mask), high))
-        }
+        };
     }
 }
 
@@ -175,7 +152,7 @@ impl Lanes for F32x8 {
     const N: usize = 8;
     type Mask = Self;
     type Double = Two<F64x4>;
-    memory!(_mm256_set1_ps _mm256_load_ps _mm256_storeu_ps);
+    memory!(f32: _mm256_set1_ps _mm256_load_ps _mm256_storeu_ps);
     #[inline(always)]
     unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
         unsafe { Self(_mm256_setr_m128(_mm_load_ps(from[0]), _mm_load_ps(from[1]))) }
@@ -189,38 +166,32 @@ impl Lanes for F32x8 {
     }
     quarters!(_mm256_unpacklo_ps _mm256_unpackhi_ps _mm256_shuffle_ps _mm256_permute_ps);
     functions! {
-        min(a, b) -> Self = Self(_mm256_min_ps(a.0, b.0));
-        max(a, b) -> Self = Self(_mm256_max_ps(a.0, b.0));
-        mul_add(a, b, c) -> Self = Self(_mm256_fmadd_ps(a.0, b.0, c.0));
-        mul_sub(a, b, c) -> Self = Self(_mm256_fmsub_ps(a.0, b.0, c.0));
-        lt(a, b) -> Self = Self(_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> Self = Self(_mm256_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> Self = Self(_mm256_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
-        signs(a) -> u32 = _mm256_movemask_ps(a.0) as u32;
-        greatest(a) -> f32 =
-            F32x4(_mm_max_ps(_mm256_castps256_ps128(a.0), _mm256_extractf128_ps::<1>(a.0))).greatest();
-        double(a) -> Two<F64x4> = Two(
-            F64x4(_mm256_cvtps_pd(_mm256_castps256_ps128(a.0))),
-            F64x4(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a.0))),
+        fn min(self, b: Self) -> Self = Self(_mm256_min_ps(self.0, b.0));
+        fn max(self, b: Self) -> Self = Self(_mm256_max_ps(self.0, b.0));
+        fn mul_add(self, b: Self, c: Self) -> Self = Self(_mm256_fmadd_ps(self.0, b.0, c.0));
+        fn mul_sub(self, b: Self, c: Self) -> Self = Self(_mm256_fmsub_ps(self.0, b.0, c.0));
+        fn lt(self, b: Self) -> Self = Self(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, b.0));
+        fn le(self, b: Self) -> Self = Self(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, b.0));
+        fn eq(self, b: Self) -> Self = Self(_mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, b.0));
+        fn signs(self) -> u32 = _mm256_movemask_ps(self.0) as u32;
+        fn greatest(self) -> f32 =
+            F32x4(_mm_max_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0))).greatest();
+        fn double(self) -> Two<F64x4> = Two(
+            F64x4(_mm256_cvtps_pd(_mm256_castps256_ps128(self.0))),
+            F64x4(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(self.0))),
         );
-        below(a, b) -> Self = {
-            let a = _mm256_castps_si256(a.0);
+        fn below(self, b: Self) -> Self = {
+            let a = _mm256_castps_si256(self.0);
             let b = _mm256_castps_si256(b.0);
             let not_below = _mm256_cmpeq_epi32(_mm256_max_epu32(a, b), a);
             Self(_mm256_castsi256_ps(_mm256_xor_si256(not_below, _mm256_set1_epi32(-1))))
         };
-    }
-    #[inline(always)]
-    fn select(mask: Self, yes: Self, no: Self) -> Self {
-        unsafe { Self(_mm256_blendv_ps(no.0, yes.0, mask.0)) }
-    }
-    #[inline(always)]
-    fn single(Two(low, high): Two<F64x4>) -> Self {
-        unsafe { Self(_mm256_setr_m128(_mm256_cvtpd_ps(low.0), _mm256_cvtpd_ps(high.0))) }
-    }
-    #[inline(always)]
-    fn narrow(Two(low, high): Two<F64x4>) -> Self {
-        unsafe { Self(_mm256_setr_m128(F32x4::narrow(low).0, F32x4::narrow(high).0)) }
+        fn select(mask: Self, yes: Self, no: Self) -> Self =
+            Self(_mm256_blendv_ps(no.0, yes.0, mask.0));
+        fn single(Two(low, high): Two<F64x4>) -> Self =
+            Self(_mm256_setr_m128(_mm256_cvtpd_ps(low.0), _mm256_cvtpd_ps(high.0)));
+        fn narrow(Two(low, high): Two<F64x4>) -> Self =
+            Self(_mm256_setr_m128(F32x4::narrow(low).0, F32x4::narrow(high).0));
     }
 }
 
@@ -228,7 +199,7 @@ impl Lanes for F32x16 {
     const N: usize = 16;
     type Mask = u16;
     type Double = Two<F64x8>;
-    memory!(_mm512_set1_ps _mm512_load_ps _mm512_storeu_ps);
+    memory!(f32: _mm512_set1_ps _mm512_load_ps _mm512_storeu_ps);
     #[inline(always)]
     unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
         unsafe {
@@ -248,80 +219,50 @@ impl Lanes for F32x16 {
     }
     quarters!(_mm512_unpacklo_ps _mm512_unpackhi_ps _mm512_shuffle_ps _mm512_permute_ps);
     functions! {
-        min(a, b) -> Self = Self(_mm512_min_ps(a.0, b.0));
-        max(a, b) -> Self = Self(_mm512_max_ps(a.0, b.0));
-        mul_add(a, b, c) -> Self = Self(_mm512_fmadd_ps(a.0, b.0, c.0));
-        mul_sub(a, b, c) -> Self = Self(_mm512_fmsub_ps(a.0, b.0, c.0));
-        lt(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0);
-        le(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0);
-        eq(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a.0, b.0);
-        signs(a) -> u32 = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(a.0)));
-        greatest(a) -> f32 =
-            F32x8(_mm256_max_ps(_mm512_castps512_ps256(a.0), _mm512_extractf32x8_ps::<1>(a.0))).greatest();
-        double(a) -> Two<F64x8> = Two(
-            F64x8(_mm512_cvtps_pd(_mm512_castps512_ps256(a.0))),
-            F64x8(_mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a.0))),
+        fn min(self, b: Self) -> Self = Self(_mm512_min_ps(self.0, b.0));
+        fn max(self, b: Self) -> Self = Self(_mm512_max_ps(self.0, b.0));
+        fn mul_add(self, b: Self, c: Self) -> Self = Self(_mm512_fmadd_ps(self.0, b.0, c.0));
+        fn mul_sub(self, b: Self, c: Self) -> Self = Self(_mm512_fmsub_ps(self.0, b.0, c.0));
+        fn lt(self, b: Self) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, b.0);
+        fn le(self, b: Self) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, b.0);
+        fn eq(self, b: Self) -> u16 = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, b.0);
+        fn signs(self) -> u32 = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(self.0)));
+        fn greatest(self) -> f32 =
+            F32x8(_mm256_max_ps(_mm512_castps512_ps256(self.0), _mm512_extractf32x8_ps::<1>(self.0))).greatest();
+        fn double(self) -> Two<F64x8> = Two(
+            F64x8(_mm512_cvtps_pd(_mm512_castps512_ps256(self.0))),
+            F64x8(_mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(self.0))),
         );
-        below(a, b) -> u16 =
-            _mm512_cmplt_epu32_mask(_mm512_castps_si512(a.0), _mm512_castps_si512(b.0));
-    }
-    #[inline(always)]
-    fn select(mask: u16, yes: Self, no: Self) -> Self {
-        unsafe { Self(_mm512_mask_mov_ps(no.0, mask, yes.0)) }
-    }
-    #[inline(always)]
-    fn single(Two(low, high): Two<F64x8>) -> Self {
-        unsafe {
+        fn below(self, b: Self) -> u16 =
+            _mm512_cmplt_epu32_mask(_mm512_castps_si512(self.0), _mm512_castps_si512(b.0));
+        fn select(mask: u16, yes: Self, no: Self) -> Self = Self(_mm512_mask_mov_ps(no.0, mask, yes.0));
+        fn single(Two(low, high): Two<F64x8>) -> Self = {
             let low = _mm512_castps256_ps512(_mm512_cvtpd_ps(low.0));
             Self(_mm512_insertf32x8::<1>(low, _mm512_cvtpd_ps(high.0)))
-        }
-    }
-    #[inline(always)]
-    fn narrow(Two(low, high): Two<u8>) -> u16 {
-        u16::from_le_bytes([low, high])
+        };
+        fn narrow(Two(low, high): Two<u8>) -> u16 = u16::from_le_bytes([low, high]);
     }
 }
 
 impl DoubleLanes for F64x4 {
     type Mask = Self;
-    #[inline(always)]
-    unsafe fn splat(x: f64) -> Self {
-        unsafe { Self(_mm256_set1_pd(x)) }
-    }
-    #[inline(always)]
-    unsafe fn load(from: *const f64) -> Self {
-        unsafe { Self(_mm256_loadu_pd(from)) }
-    }
-    #[inline(always)]
-    fn two_product(self, other: Self) -> (Self, Self) {
-        let product = self * other;
-        (product, self.mul_sub(other, product))
-    }
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f64) {
-        unsafe { _mm256_storeu_pd(to, self.0) }
-    }
-    #[inline(always)]
-    fn select(mask: Self, yes: Self, no: Self) -> Self {
-        unsafe { Self(_mm256_blendv_pd(no.0, yes.0, mask.0)) }
-    }
+    memory!(f64: _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd);
     functions! {
-        min(a, b) -> Self = Self(_mm256_min_pd(a.0, b.0));
-        max(a, b) -> Self = Self(_mm256_max_pd(a.0, b.0));
-        mul_add(a, b, c) -> Self = Self(_mm256_fmadd_pd(a.0, b.0, c.0));
-        mul_sub(a, b, c) -> Self = Self(_mm256_fmsub_pd(a.0, b.0, c.0));
-        lt(a, b) -> Self = Self(_mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> Self = Self(_mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> Self = Self(_mm256_cmp_pd::<_CMP_EQ_OQ>(a.0, b.0));
+        fn min(self, b: Self) -> Self = Self(_mm256_min_pd(self.0, b.0));
+        fn max(self, b: Self) -> Self = Self(_mm256_max_pd(self.0, b.0));
+        fn mul_add(self, b: Self, c: Self) -> Self = Self(_mm256_fmadd_pd(self.0, b.0, c.0));
+        fn mul_sub(self, b: Self, c: Self) -> Self = Self(_mm256_fmsub_pd(self.0, b.0, c.0));
+        fn lt(self, b: Self) -> Self = Self(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, b.0));
+        fn le(self, b: Self) -> Self = Self(_mm256_cmp_pd::<_CMP_LE_OQ>(self.0, b.0));
+        fn eq(self, b: Self) -> Self = Self(_mm256_cmp_pd::<_CMP_EQ_OQ>(self.0, b.0));
+        fn select(mask: Self, yes: Self, no: Self) -> Self =
+            Self(_mm256_blendv_pd(no.0, yes.0, mask.0));
     }
 }
 
 impl DoubleLanes for F64x8 {
     type Mask = u8;
-    #[inline(always)]
-    unsafe fn splat(x: f64) -> Self {
-        unsafe { Self(_mm512_set1_pd(x)) }
-    }
+    memory!(f64: _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd);
     /// Two steps of Newton's method, which take half the time of a division. Of 0 and ∞ they make
     /// NaN, which no comparison accepts.
     #[inline(always)]
@@ -333,31 +274,15 @@ impl DoubleLanes for F64x8 {
             Self(_mm512_fmadd_pd(_mm512_fnmadd_pd(self.0, x, one), x, x))
         }
     }
-    #[inline(always)]
-    unsafe fn load(from: *const f64) -> Self {
-        unsafe { Self(_mm512_loadu_pd(from)) }
-    }
-    #[inline(always)]
-    fn two_product(self, other: Self) -> (Self, Self) {
-        let product = self * other;
-        (product, self.mul_sub(other, product))
-    }
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f64) {
-        unsafe { _mm512_storeu_pd(to, self.0) }
-    }
-    #[inline(always)]
-    fn select(mask: u8, yes: Self, no: Self) -> Self {
-        unsafe { Self(_mm512_mask_mov_pd(no.0, mask, yes.0)) }
-    }
     functions! {
-        min(a, b) -> Self = Self(_mm512_min_pd(a.0, b.0));
-        max(a, b) -> Self = Self(_mm512_max_pd(a.0, b.0));
-        mul_add(a, b, c) -> Self = Self(_mm512_fmadd_pd(a.0, b.0, c.0));
-        mul_sub(a, b, c) -> Self = Self(_mm512_fmsub_pd(a.0, b.0, c.0));
-        lt(a, b) -> u8 = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0);
-        le(a, b) -> u8 = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(a.0, b.0);
-        eq(a, b) -> u8 = _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a.0, b.0);
+        fn min(self, b: Self) -> Self = Self(_mm512_min_pd(self.0, b.0));
+        fn max(self, b: Self) -> Self = Self(_mm512_max_pd(self.0, b.0));
+        fn mul_add(self, b: Self, c: Self) -> Self = Self(_mm512_fmadd_pd(self.0, b.0, c.0));
+        fn mul_sub(self, b: Self, c: Self) -> Self = Self(_mm512_fmsub_pd(self.0, b.0, c.0));
+        fn lt(self, b: Self) -> u8 = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, b.0);
+        fn le(self, b: Self) -> u8 = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(self.0, b.0);
+        fn eq(self, b: Self) -> u8 = _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, b.0);
+        fn select(mask: u8, yes: Self, no: Self) -> Self = Self(_mm512_mask_mov_pd(no.0, mask, yes.0));
     }
 }
 
@@ -383,17 +308,8 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
         unsafe { Self(T::splat(x), T::splat(x)) }
     }
     #[inline(always)]
-    fn inverse(self) -> Self {
-        Self(self.0.inverse(), self.1.inverse())
-    }
-    #[inline(always)]
     unsafe fn load(from: *const f64) -> Self {
         unsafe { Self(T::load(from), T::load(from.cast::<T>().add(1).cast())) }
-    }
-    #[inline(always)]
-    fn two_product(self, other: Self) -> (Self, Self) {
-        let product = self * other;
-        (product, self.mul_sub(other, product))
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
@@ -402,25 +318,23 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
             self.1.store(to.cast::<T>().add(1).cast());
         }
     }
-    #[inline(always)]
-    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
-        Self(T::select(mask.0, yes.0, no.0), T::select(mask.1, yes.1, no.1))
-    }
     functions! {
-        min(a, b) -> Self = Self(a.0.min(b.0), a.1.min(b.1));
-        max(a, b) -> Self = Self(a.0.max(b.0), a.1.max(b.1));
-        mul_add(a, b, c) -> Self = Self(a.0.mul_add(b.0, c.0), a.1.mul_add(b.1, c.1));
-        mul_sub(a, b, c) -> Self = Self(a.0.mul_sub(b.0, c.0), a.1.mul_sub(b.1, c.1));
-        lt(a, b) -> Self::Mask = Two(a.0.lt(b.0), a.1.lt(b.1));
-        le(a, b) -> Self::Mask = Two(a.0.le(b.0), a.1.le(b.1));
-        eq(a, b) -> Self::Mask = Two(a.0.eq(b.0), a.1.eq(b.1));
+        fn min(self, b: Self) -> Self = Self(self.0.min(b.0), self.1.min(b.1));
+        fn max(self, b: Self) -> Self = Self(self.0.max(b.0), self.1.max(b.1));
+        fn mul_add(self, b: Self, c: Self) -> Self = Self(self.0.mul_add(b.0, c.0), self.1.mul_add(b.1, c.1));
+        fn mul_sub(self, b: Self, c: Self) -> Self = Self(self.0.mul_sub(b.0, c.0), self.1.mul_sub(b.1, c.1));
+        fn lt(self, b: Self) -> Self::Mask = Two(self.0.lt(b.0), self.1.lt(b.1));
+        fn le(self, b: Self) -> Self::Mask = Two(self.0.le(b.0), self.1.le(b.1));
+        fn eq(self, b: Self) -> Self::Mask = Two(self.0.eq(b.0), self.1.eq(b.1));
+        fn inverse(self) -> Self = Self(self.0.inverse(), self.1.inverse());
+        fn select(mask: Self::Mask, yes: Self, no: Self) -> Self =
+            Self(T::select(mask.0, yes.0, no.0), T::select(mask.1, yes.1, no.1));
     }
 }
 
 impl Mask for F32x4 {
-    #[inline(always)]
-    fn bits(self) -> u32 {
-        self.signs()
+    functions! {
+        fn bits(self) -> u32 = self.signs();
     }
     #[inline(always)]
     unsafe fn from_bits(bits: u32) -> Self {
@@ -433,9 +347,8 @@ impl Mask for F32x4 {
 }
 
 impl Mask for F32x8 {
-    #[inline(always)]
-    fn bits(self) -> u32 {
-        self.signs()
+    functions! {
+        fn bits(self) -> u32 = self.signs();
     }
     #[inline(always)]
     unsafe fn from_bits(bits: u32) -> Self {

@@ -1,56 +1,8 @@
-//! Keys of a node's children, and their order.
+//! Keys of a node's children, and their order, in AVX2.
 
 use crate::wide::instructions::Pending;
 use crate::wide::layout::{Child, WideNode};
 use core::arch::x86_64::*;
-
-/// The functions that both instruction sets have in common. `$features` are those of the set.
-/// `$compress` moves the lanes of a mask to the front. If all others are 0, zeros follow.
-macro_rules! shared {
-    ($features:tt, $compress:ident) => {
-        #[inline(always)]
-        unsafe fn prefetch(line: *const u8) {
-            // SAFETY: a prefetch may name any address.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
-        }
-
-        #[target_feature(enable = $features)]
-        #[inline(never)]
-        unsafe fn call<T: Task<Self>>(task: T) -> T::Output {
-            // SAFETY: the processor has the instructions, with which this function is compiled.
-            unsafe { task.run() }
-        }
-
-        #[inline(always)]
-        unsafe fn sort_keys(F32x8(keys): F32x8, mask: u32, to: *mut u32) {
-            // SAFETY: the processor has the instructions, and there is room for eight.
-            unsafe {
-                let keys = $compress(_mm256_castps_si256(keys), mask);
-                _mm256_storeu_si256(to.cast(), sort::descending(keys, mask.count_ones()));
-            }
-        }
-
-        #[inline(always)]
-        unsafe fn compress_keys(F32x8(keys): F32x8, mask: u32, to: *mut u32) {
-            // SAFETY: the processor has the instructions, and there is room for eight.
-            unsafe {
-                _mm256_storeu_si256(to.cast(), $compress(_mm256_castps_si256(keys), mask));
-            }
-        }
-
-        #[inline(always)]
-        unsafe fn sort(node: &WideNode, F32x8(keys): F32x8, mask: u32, to: *mut Pending) -> Child {
-            // SAFETY: the processor has the instructions, and there is room for eight.
-            unsafe {
-                let keys = _mm256_castps_si256(keys);
-                // The nearest child first: a traversal waits for it, and not for the rest.
-                let nearest = sort::nearest(node, keys);
-                sort::write(node, $compress(keys, mask), mask.count_ones(), to);
-                nearest
-            }
-        }
-    };
-}
 
 /// Returns the first `count` keys in descending order, if all others are 0.
 #[inline(always)]

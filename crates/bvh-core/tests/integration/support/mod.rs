@@ -188,10 +188,8 @@ fn torus(rings: usize, sides: usize) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     for ring in 0..rings {
         for side in 0..sides {
-            let a = at(ring, side);
-            let b = at(ring + 1, side);
-            let c = at(ring + 1, side + 1);
-            let d = at(ring, side + 1);
+            let [a, b] = [at(ring, side), at(ring + 1, side)];
+            let [c, d] = [at(ring + 1, side + 1), at(ring, side + 1)];
             triangles.extend([[a, b, c], [a, c, d]].map(Triangle));
         }
     }
@@ -214,9 +212,7 @@ pub fn junction() -> Vec<Triangle> {
 pub fn closed_meshes() -> Vec<(&'static str, Vec<Triangle>, Vec3)> {
     let turn = Quat::from_xyzw(0.1, 0.7, -0.3, 0.5).normalize();
     // Neighbours have the same corners, and the same operations move them.
-    let turned = |triangles: Vec<Triangle>| -> Vec<Triangle> {
-        triangles.iter().map(|t| Triangle(t.0.map(|corner| turn * corner))).collect()
-    };
+    let turned = |triangles: Vec<Triangle>| mapped(&triangles, |corner| turn * corner);
     let nested = [scaled(&ball(2), 2.0), ball(2)].concat();
     let center = Vec3::new(0.013, -0.02, 0.017);
     let torus_inside = Vec3::new(0.99, 0.02, 0.03);
@@ -240,8 +236,12 @@ pub fn size(triangles: &[Triangle]) -> f32 {
     sizes.fold(0.0, f32::max)
 }
 
+pub fn mapped(triangles: &[Triangle], f: impl Fn(Vec3) -> Vec3) -> Vec<Triangle> {
+    triangles.iter().map(|t| Triangle(t.0.map(&f))).collect()
+}
+
 pub fn scaled(triangles: &[Triangle], factor: f32) -> Vec<Triangle> {
-    triangles.iter().map(|t| Triangle(t.0.map(|p| p * factor))).collect()
+    mapped(triangles, |p| p * factor)
 }
 
 /// Returns difficult rays: axis-parallel with both zeros, in face planes, along edges, through

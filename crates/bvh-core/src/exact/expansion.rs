@@ -4,7 +4,7 @@
 //! are adjacent: between the last bit of a term and the first bit of the term before it is a zero
 //! bit. The terms before the last one together are therefore smaller than half of the last one,
 //! which has the sign of the sum. Sums and products of expansions are exact as long as nothing
-//! overflows or underflows, which the [range](crate::exact) of coordinates guarantees.
+//! overflows or underflows, which the [range](super) of coordinates guarantees.
 //!
 //! Source: Shewchuk 1997, 'Adaptive precision floating-point arithmetic and fast robust geometric
 //! predicates', theorems 6 (Knuth's sum), 10 (grow-expansion), 18 (Dekker's product); zero terms
@@ -12,7 +12,7 @@
 
 /// An exact number: the sum of at most `N` terms.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Expansion<const N: usize> {
+pub(super) struct Expansion<const N: usize> {
     terms: [f64; N],
     len: usize,
 }
@@ -20,12 +20,11 @@ pub(crate) struct Expansion<const N: usize> {
 impl<const N: usize> Expansion<N> {
     /// Returns zero. A constant would be copied, terms that nobody reads included.
     #[inline(always)]
-    pub(crate) fn zero() -> Self {
+    pub(super) fn zero() -> Self {
         Self { terms: [0.0; N], len: 0 }
     }
 
-    /// Returns `self` with room for more terms.
-    pub(crate) fn widened<const M: usize>(&self) -> Expansion<M> {
+    pub(super) fn widened<const M: usize>(&self) -> Expansion<M> {
         let mut wide = Expansion::zero();
         wide.terms[..self.len].copy_from_slice(self.terms());
         wide.len = self.len;
@@ -40,7 +39,7 @@ impl<const N: usize> Expansion<N> {
     ///
     /// # Panics
     /// Panics if there is no room for another term.
-    pub(crate) fn add(&mut self, number: f64) {
+    pub(super) fn add(&mut self, number: f64) {
         let mut carry = number;
         let mut kept = 0;
         for i in 0..self.len {
@@ -60,7 +59,7 @@ impl<const N: usize> Expansion<N> {
 
     /// Adds the product of an expansion and a number: at most two terms for each term of the
     /// expansion.
-    pub(crate) fn add_scaled<const M: usize>(&mut self, factor: &Expansion<M>, number: f64) {
+    pub(super) fn add_scaled<const M: usize>(&mut self, factor: &Expansion<M>, number: f64) {
         for &term in factor.terms() {
             let (product, rest) = two_product(term, number);
             self.add(rest);
@@ -68,36 +67,27 @@ impl<const N: usize> Expansion<N> {
         }
     }
 
-    /// Adds the product of two expansions: at most two terms for each pair of their terms.
-    pub(crate) fn add_product<const A: usize, const B: usize>(
+    /// Adds the product of two expansions and a `sign`, 1 or −1: at most two terms for each pair of
+    /// their terms.
+    pub(super) fn add_product<const A: usize, const B: usize>(
         &mut self,
         a: &Expansion<A>,
         b: &Expansion<B>,
+        sign: f64,
     ) {
         for &term in b.terms() {
-            self.add_scaled(a, term);
-        }
-    }
-
-    /// Subtracts the product of two expansions: at most two terms for each pair of their terms.
-    pub(crate) fn subtract_product<const A: usize, const B: usize>(
-        &mut self,
-        a: &Expansion<A>,
-        b: &Expansion<B>,
-    ) {
-        for &term in b.terms() {
-            self.add_scaled(a, -term);
+            self.add_scaled(a, sign * term);
         }
     }
 
     /// Returns the value times a power of two, which must neither overflow nor underflow.
-    pub(crate) fn scaled(mut self, power: f64) -> Self {
+    pub(super) fn scaled(mut self, power: f64) -> Self {
         self.terms[..self.len].iter_mut().for_each(|term| *term *= power);
         self
     }
 
     /// Returns the sign of the exact value: −1, 0 or 1.
-    pub(crate) fn sign(&self) -> i32 {
+    pub(super) fn sign(&self) -> i32 {
         match self.terms().last() {
             None => 0,
             Some(last) if *last < 0.0 => -1,
@@ -107,13 +97,13 @@ impl<const N: usize> Expansion<N> {
 
     /// Returns the value in f64, with a relative error below 2⁻⁴⁰ and with the sign of the exact
     /// value.
-    pub(crate) fn approximate(&self) -> f64 {
+    pub(super) fn approximate(&self) -> f64 {
         self.terms().iter().sum()
     }
 }
 
 impl Expansion<2> {
-    pub(crate) fn difference(a: f64, b: f64) -> Self {
+    pub(super) fn difference(a: f64, b: f64) -> Self {
         let (sum, rest) = two_sum(a, -b);
         let mut difference = Self::zero();
         // The rounding error is never adjacent to the sum.
@@ -128,7 +118,7 @@ impl Expansion<2> {
 }
 
 /// Returns the rounded sum of two numbers and the rounding error (Knuth).
-pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
     let a_part = sum - b_part;
@@ -137,7 +127,7 @@ pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 /// Returns the rounded product of two numbers and the rounding error (Dekker). It avoids the fused
 /// operation, which `core` and some processors lack.
-pub(crate) fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     let (a_high, a_low) = split(a);
     let (b_high, b_low) = split(b);
