@@ -1,7 +1,6 @@
 //! [`Watch`]: the caller's way to cancel a construction.
 
 use crate::BuildError;
-use std::fmt::{self, Debug, Formatter};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Asks the caller whether to cancel a construction. Each thread of a builder polls about once per
@@ -51,12 +50,6 @@ impl<'a> Watch<'a> {
     /// Returns [`BuildError::Cancelled`] if a poll has cancelled the construction. Does not poll.
     pub fn ensure_wanted(&self) -> Result<(), BuildError> {
         if self.ended.load(Relaxed) { Err(BuildError::Cancelled) } else { Ok(()) }
-    }
-}
-
-impl Debug for Watch<'_> {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Watch").field("ended", &self.ended).finish_non_exhaustive()
     }
 }
 

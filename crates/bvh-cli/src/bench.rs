@@ -161,7 +161,7 @@ fn rays(scene: &Scene, tree: &Bvh) -> Vec<Measured> {
         let direction = camera.direction(x + 0.5, y + 0.5).as_vec3();
         Ray::half_line(camera.origin.as_vec3(), direction).ok()
     };
-    let anywhere = of_anything(COUNT, scene, tree, 1, &|| false);
+    let anywhere = of_anything(COUNT, &scene.primitives, tree, 1, &|| false);
     let of_kind = |kind| {
         let of_kind = anywhere.iter().filter(move |traced| traced.kind == kind);
         of_kind.map(|traced| traced.ray).collect()

@@ -23,10 +23,8 @@ impl OutOfRange {
     }
 }
 
-/// A deserializer that tracks the path of the current value.
 type Tracked<'a, 'b> = Deserializer<'a, 'b, Value>;
 
-/// Deserialises a table by `read`, and checks the ranges.
 fn tracked<T: Check>(
     table: Table,
     read: impl FnOnce(Tracked) -> Result<T, toml::de::Error>,

@@ -2,7 +2,6 @@ use super::*;
 use std::collections::BTreeMap;
 
 crate::config! {
-    /// A configuration that contains another.
     struct Outer {
         /// Limited on both sides, without the lower end.
         part: f64 = 0.5, in (Excluded(0.0), Included(1.0));
@@ -22,7 +21,6 @@ crate::config! {
 }
 
 crate::config! {
-    /// Contained in another configuration.
     struct Inner {
         /// May be infinite.
         limit: f64 = f64::INFINITY, in 1.0..=f64::INFINITY;

@@ -252,7 +252,6 @@ impl<'a> Bake<'a> {
         }
     }
 
-    /// Returns the parts of the objects, if they are known.
     fn parts(&self) -> Option<Box<dyn Clip + 'a>> {
         self.shapes?.parts_in(self.frame)
     }
@@ -325,7 +324,6 @@ impl<'a> Bake<'a> {
         Ok(write(&sections.each_ref().map(|section| &**section)))
     }
 
-    /// Returns the visits of all nodes by the rays; none if there are no rays.
     fn visits(&self, tree: &Bvh) -> Vec<f32> {
         const NODES_PER_TASK: usize = 1 << 16;
         let Some(density) = self.rays else { return Vec::new() };

@@ -156,7 +156,6 @@ fn per_ray(tree: &Bvh, density: Option<&RayDensity>) -> f64 {
     Objective::Layout.cost_by(tree, density) / if root > 0.0 { root } else { 1.0 }
 }
 
-/// A combination of choices.
 #[derive(Clone, Copy)]
 struct Combination {
     objective: Objective,
@@ -222,10 +221,10 @@ impl<'a> Bake<'a> {
             chosen.density = rays(greedy, self.seed, &|| untimed.cancelled())?;
         }
         let mut forecast = None;
-        if let Some(greedy) = chosen.greedy.take() {
-            if combinations.len() > 1 {
-                forecast = self.compare(open, &combinations, &greedy, &mut chosen, observer)?;
-            }
+        if combinations.len() > 1
+            && let Some(greedy) = chosen.greedy.take()
+        {
+            forecast = self.compare(open, &combinations, &greedy, &mut chosen, observer)?;
             chosen.greedy = Some(greedy);
         }
         let objects = self.boxes.len();
@@ -332,7 +331,6 @@ impl<'a> Bake<'a> {
         Ok(Some(1.0 - tests[place] / of_greedy))
     }
 
-    /// Prepares a trial. Builds the greedy tree unless there is one.
     fn trial(
         &self,
         greedy: Option<Bvh>,
@@ -455,37 +453,34 @@ mod tests {
     #[test]
     fn every_choice_is_compared_with_its_alternative_other_things_being_equal() {
         let anywhere: MadeRays = &|_, _, _| Ok(None);
-        let all =
-            Open { cost: true, references: true, anywhere: Some(anywhere), ..Open::default() };
+        let cost = Open { cost: true, ..Open::default() };
+        let of_whole = Open { anywhere: Some(anywhere), ..cost };
+        let all = Open { references: true, ..of_whole };
         // Area, the layout, and the layout for rays, of whole and of divided objects.
         let tests = [100.0, 90.0, 80.0, 50.0, 40.0, 10.0];
+        let ninth = 1.0 / 9.0;
         let [layout, rays, divided] = [Tried::Layout, Tried::Rays, Tried::References];
         for (open, tests, place, expected) in [
             (
                 all,
                 &tests[..],
                 0,
-                &[(layout, false, 0.1), (rays, false, 1.0 / 9.0), (divided, false, 0.5)][..],
+                vec![(layout, false, 0.1), (rays, false, ninth), (divided, false, 0.5)],
             ),
             (
                 all,
                 &tests,
                 1,
-                &[(layout, true, 0.1), (rays, false, 1.0 / 9.0), (divided, false, 5.0 / 9.0)],
+                vec![(layout, true, 0.1), (rays, false, ninth), (divided, false, 5.0 * ninth)],
             ),
-            (all, &tests, 5, &[(layout, true, 0.8), (rays, true, 0.75), (divided, true, 0.875)]),
-            (
-                Open { references: false, ..all },
-                &tests[..3],
-                2,
-                &[(layout, true, 0.2), (rays, true, 1.0 / 9.0)],
-            ),
-            (Open { cost: true, ..Open::default() }, &[4.0, 5.0], 0, &[(layout, false, -0.25)]),
+            (all, &tests, 5, vec![(layout, true, 0.8), (rays, true, 0.75), (divided, true, 0.875)]),
+            (of_whole, &tests[..3], 2, vec![(layout, true, 0.2), (rays, true, ninth)]),
+            (cost, &[4.0, 5.0], 0, vec![(layout, false, -0.25)]),
         ] {
             let mut chosen = Bake::new(&[]).choose(&Open::default(), None, &()).unwrap();
             chosen.explain(&open, tests, place);
             assert_eq!(chosen.reasons.len(), expected.len());
-            for (found, &(choice, is_chosen, saved)) in chosen.reasons.iter().zip(expected) {
+            for (found, (choice, is_chosen, saved)) in chosen.reasons.iter().zip(expected) {
                 let Reason::Tried { saved: found_saved, .. } = *found else { panic!("{found}") };
                 assert!((found_saved - saved).abs() < 1e-12, "{place}: {found_saved} {saved}");
                 assert_eq!(*found, Reason::Tried { choice, is_chosen, saved: found_saved });

@@ -144,9 +144,7 @@ impl Choice {
         let choice = affordable.and_then(|(size, searches)| scene.choose(size, searches));
         choice.unwrap_or(Self::FILE)
     }
-}
 
-impl Choice {
     /// Chooses the frame of a bake over these shapes: the [best](Self::of) one of triangles, if they
     /// are free to choose, and one with its centre in their middle of those in f64. `None` for other
     /// shapes, and for triangles in f32 along the file's axes.
@@ -186,7 +184,6 @@ impl Choice {
     }
 }
 
-/// A scene whose frame is chosen.
 struct Scene<'a> {
     triangles: &'a [Triangle],
     /// The centre of every frame.
@@ -195,7 +192,6 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// Returns the work of a choice with a first sample of this size.
     fn work(&self, size: usize, searches: bool) -> f64 {
         let sample = |growth: usize| (growth * size).min(self.triangles.len());
         let search = (STARTS + 3 * KEPT * STEPS.len()) * sample(1) + KEPT * sample(GROWTH);
@@ -507,9 +503,8 @@ mod tests {
         }
         // No rotation is farther than 62.8 degrees.
         let mut rng = stream(1, 0);
-        assert!(
-            (0..1000).all(|_| random_rotation(&mut rng).w > (0.5f64 * 62.9).to_radians().cos())
-        );
+        let least = (0.5f64 * 62.9).to_radians().cos();
+        assert!((0..1000).all(|_| random_rotation(&mut rng).w > least));
     }
 
     #[test]
@@ -518,9 +513,8 @@ mod tests {
         let at = |corner: [f64; 3]| (oblique * DVec3::from(corner)).as_vec3();
         let wall = Triangle([[0.0; 3], [4.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(at));
         let (rotation, size) = told(&wall).unwrap();
-        assert!(
-            agreement(rotation, oblique.conjugate()) > 1.0 - 1e-12 && (size - 2.0).abs() < 1e-6
-        );
+        let is_told = agreement(rotation, oblique.conjugate()) > 1.0 - 1e-12;
+        assert!(is_told && (size - 2.0).abs() < 1e-6);
         let needle = Triangle([[0.0; 3], [4.0, 0.0, 0.0], [2.0, 1e-4, 0.0]].map(at));
         assert_eq!(told(&needle), None);
         // Three walls of a room, and a smaller oblique one.

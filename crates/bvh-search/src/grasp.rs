@@ -69,7 +69,6 @@ impl LocalSearch {
 
 search_by_metric!(Config);
 
-/// A constructed and improved tree.
 #[derive(Debug)]
 struct Trial {
     cost: f64,

@@ -278,7 +278,6 @@ impl OwnedTree {
         }
     }
 
-    /// Builds the value without a tree.
     fn bare(objects: Objects, frame: Option<Frame>) -> Self {
         let (boxes, shapes) = boxes_of(objects, frame.as_ref());
         let tree = Bvh { frame, ..Bvh::default() };
@@ -295,7 +294,6 @@ impl OwnedTree {
         }
     }
 
-    /// The search that continues from the tree.
     fn bake(&self) -> Bake<'_> {
         Bake {
             frame: self.tree.frame.as_ref(),
@@ -310,7 +308,6 @@ impl OwnedTree {
     }
 }
 
-/// Returns the boxes of objects, those of triangles in a frame, and the shapes if there are any.
 fn boxes_of(objects: Objects, frame: Option<&Frame>) -> (Vec<Aabb>, Option<Primitives>) {
     match objects {
         Objects::Boxes(boxes) => (boxes, None),

@@ -70,7 +70,6 @@ fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
     place.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Calls two functions. Each may run on another thread.
 pub(crate) fn call_both(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
     #[cfg(feature = "rayon")]
     rayon::join(first, second);

@@ -1,7 +1,7 @@
 //! Scenes and trees for the unit tests of searches.
 
 use crate::run::{Found, Observer, Problem, Run, Search};
-use crate::tree::{Area, Working};
+use crate::tree::{HalfArea, Working};
 use bvh_build::Builder;
 use bvh_config::Check;
 use bvh_core::{Aabb, Bvh, RayDensity, Segment};
@@ -21,7 +21,7 @@ pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
 /// Builds the working form of a binary tree over finite boxes.
 pub(crate) fn built(builder: &dyn Builder, boxes: &[Aabb]) -> Working {
     let tree = builder.build(boxes).unwrap();
-    Working::from_bvh(&tree, Area).unwrap()
+    Working::from_bvh(&tree, HalfArea::default()).unwrap()
 }
 
 /// Returns the density of rays from a corner of the scene to the corners of all objects; `None` if

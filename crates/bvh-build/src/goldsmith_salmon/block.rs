@@ -2,7 +2,9 @@
 //! vector comparison serve four boxes.
 
 use super::Object;
+use crate::larger;
 use bvh_core::cost::{Area, Measure};
+use bvh_core::glam::Vec4;
 use bvh_core::{Aabb, PackedAabb};
 
 /// The size of a box given as −min.xyz, max.xyz: its half area, or a measure.
@@ -67,37 +69,15 @@ impl Block {
         (lanes != 0).then(|| lanes.trailing_zeros() as usize % LANES)
     }
 
-    /// Returns one bit per inner child that contains `b`. Compilers do not vectorise the plain
-    /// version below.
-    #[cfg(target_arch = "x86_64")]
+    /// Returns one bit per inner child that contains `b`. Compilers do not vectorise a loop over the
+    /// lanes.
     #[inline(always)]
     fn containing(&self, b: &[f32; 6]) -> u32 {
-        use std::arch::x86_64::*;
-        // SAFETY: these intrinsics need SSE2, which every x86-64 processor has, and use no pointer.
-        unsafe {
-            let lanes = |x: [f32; LANES]| _mm_setr_ps(x[0], x[1], x[2], x[3]);
-            let side = |i: usize| _mm_cmple_ps(_mm_set1_ps(b[i]), lanes(self.bounds[i]));
-            let sides = |i: usize| _mm_and_ps(side(i), side(i + 1));
-            let contains = _mm_and_ps(_mm_and_ps(sides(0), sides(2)), sides(4));
-            // `LEAF` is the sign bit of a float, and the mask collects sign bits.
-            let [a, b, c, d] = self.link;
-            let leaves = _mm_castsi128_ps(_mm_setr_epi32(a as i32, b as i32, c as i32, d as i32));
-            _mm_movemask_ps(_mm_andnot_ps(leaves, contains)) as u32
-        }
-    }
-
-    #[cfg(not(target_arch = "x86_64"))]
-    #[inline(always)]
-    fn containing(&self, b: &[f32; 6]) -> u32 {
-        self.containing_plain(b)
-    }
-
-    #[cfg(any(test, not(target_arch = "x86_64")))]
-    #[inline(always)]
-    fn containing_plain(&self, b: &[f32; 6]) -> u32 {
-        let contains =
-            |lane: usize| !self.is_leaf(lane) && (0..6).all(|i| b[i] <= self.bounds[i][lane]);
-        (0..LANES).map(|lane| u32::from(contains(lane)) << lane).sum()
+        let side = |i: usize| Vec4::splat(b[i]).cmple(Vec4::from_array(self.bounds[i]));
+        let sides = |i: usize| side(i) & side(i + 1);
+        // `LEAF` is the sign bit of a float.
+        let leaves = Vec4::from_array(self.link.map(f32::from_bits)).is_negative_bitmask();
+        (sides(0) & sides(2) & sides(4)).bitmask() & !leaves
     }
 
     #[inline(always)]
@@ -144,12 +124,6 @@ impl Block {
     }
 }
 
-/// Returns the larger of two numbers that are not NaN. Unlike `f32::max`, it is one instruction.
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
 #[inline(always)]
 pub(super) fn place(node: u32) -> (usize, usize) {
     (node as usize / LANES, node as usize % LANES)
@@ -160,25 +134,4 @@ pub(super) fn place(node: u32) -> (usize, usize) {
 pub(super) fn family(blocks: &[Block], node: u32) -> (usize, usize) {
     let (block, lane) = place(node);
     if node == NONE { (0, 1) } else { blocks[block].family(lane) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn the_vector_comparison_finds_what_the_plain_one_finds(
-            bounds in prop::array::uniform6(prop::array::uniform4(-6i8..2)),
-            leaf in prop::array::uniform4(any::<bool>()),
-            b in prop::array::uniform6(-2i8..2),
-        ) {
-            // Zeros of both signs occur.
-            let mut block = Block { bounds: bounds.map(|side| side.map(|c| f32::from(c) * -0.5)), ..Block::EMPTY };
-            block.link = leaf.map(|leaf| if leaf { LEAF } else { 7 });
-            let b = b.map(|c| f32::from(c) * 0.5);
-            prop_assert_eq!(block.containing(&b), block.containing_plain(&b));
-        }
-    }
 }

@@ -79,8 +79,6 @@ struct Stop {
     pair_among: Option<usize>,
     /// Number of nodes in `grown` that the insertion enlarges.
     grown: usize,
-    /// Number of blocks that the search examined.
-    examined: usize,
 }
 
 /// Inserts the objects of a valid order and returns the tree's cost; `None` if the construction is
@@ -119,9 +117,9 @@ pub(super) fn insert_each<const BY_AREA: bool, const PAIR_INNER: bool>(
             }
             let row = walk.last[i];
             changes[i] = (row, walk.trail[row][i]);
-            let stop =
-                find_stop::<BY_AREA, PAIR_INNER>(blocks, size, object, walk.trail[row][i], grown);
-            examined += stop.examined;
+            let last = walk.trail[row][i];
+            let (stop, count) = find_stop::<BY_AREA, PAIR_INNER>(blocks, size, object, last, grown);
+            examined += count;
             let attached_to = attach::<BY_AREA>(blocks, &stop, object, id);
             // Only the nodes down to the stop grow; the search went further.
             grown.truncate(stop.grown);
@@ -142,8 +140,8 @@ pub(super) fn insert_each<const BY_AREA: bool, const PAIR_INNER: bool>(
     Some(if rest.is_empty() || root_area <= 0.0 { 0.0 } else { cost.value() / root_area })
 }
 
-/// Returns the stop of least increase on the path. `last` is the last node of the path that
-/// contains the object. Fills `grown` with the rest of the path.
+/// Returns the stop of least increase on the path, and the number of blocks examined. `last` is the
+/// last node of the path that contains the object. Fills `grown` with the rest of the path.
 #[inline(always)]
 fn find_stop<const BY_AREA: bool, const PAIR_INNER: bool>(
     blocks: &[Block],
@@ -151,13 +149,13 @@ fn find_stop<const BY_AREA: bool, const PAIR_INNER: bool>(
     object: &Object,
     last: u32,
     grown: &mut Vec<Grown>,
-) -> Stop {
+) -> (Stop, usize) {
     grown.clear();
     // A stop at a node that contains the object adds only the node's area, and the nodes above are
     // no smaller. The last such node is therefore the best of them.
     let (block, lane) = place(last);
     let increase = if last == NONE { f64::INFINITY } else { blocks[block].area[lane] };
-    let mut stop = Stop { increase, node: last, pair_among: None, grown: 0, examined: 0 };
+    let mut stop = Stop { increase, node: last, pair_among: None, grown: 0 };
     let (mut first, mut count) = family(blocks, last);
     let mut inherited = 0.0;
     let mut examined = 0;
@@ -193,30 +191,25 @@ fn find_stop<const BY_AREA: bool, const PAIR_INNER: bool>(
         grown.push(next);
         let (block, lane) = place(node);
         let is_leaf = blocks[block].is_leaf(lane);
+        let depth = grown.len();
         let above = inherited;
         if !is_leaf {
             inherited += if BY_AREA { least * f64::from(blocks[block].count[lane]) } else { least };
             if inherited + area < stop.increase {
-                stop = Stop {
-                    increase: inherited + area,
-                    node,
-                    pair_among: None,
-                    grown: grown.len(),
-                    examined: 0,
-                };
+                let increase = inherited + area;
+                stop = Stop { increase, node, pair_among: None, grown: depth };
             }
         }
         if (is_leaf || PAIR_INNER) && above + 2.0 * area < stop.increase {
             let increase = above + 2.0 * area;
-            stop =
-                Stop { increase, node, pair_among: Some(first), grown: grown.len(), examined: 0 };
+            stop = Stop { increase, node, pair_among: Some(first), grown: depth };
         }
         if is_leaf {
             break;
         }
         (first, count) = family(blocks, node);
     }
-    Stop { examined, ..stop }
+    (stop, examined)
 }
 
 /// Returns the area from which the growth of a leaf counts.

@@ -18,7 +18,6 @@ const PARALLEL_PAIRS: usize = 1 << 16;
 
 /// The subtrees that are not yet joined, in Morton order, and the nodes below them.
 pub(super) struct Clusters {
-    /// One box per cluster.
     boxes: Vec<PackedAabb>,
     /// Per cluster, the index of its first child, or the position of its object in Morton order
     /// with [`LEAF`].
@@ -35,9 +34,7 @@ pub(super) struct Clusters {
     /// The tree's nodes, filled from the last to the first, so that parents come before their
     /// children. Initialising them first would take a fifteenth of the build.
     nodes: Box<[MaybeUninit<Node>]>,
-    /// Number of nodes not yet filled.
     free: usize,
-    /// True if the last round joined few clusters.
     joined_few: bool,
     scratch: Scratch,
 }

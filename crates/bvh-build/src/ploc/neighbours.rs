@@ -1,6 +1,7 @@
 //! Every cluster's nearest neighbour in Morton order: vectorised over clusters, one distance after
 //! the other.
 
+use crate::larger;
 use bvh_core::cost::Measure;
 use bvh_core::{PackedAabb, with_vector_instructions};
 
@@ -128,12 +129,6 @@ fn joint_sides(low: &[f32], high: &[f32], distance: usize, sides: &mut [f32]) {
     for index in 0..pairs {
         sides[index] = larger(low[index], low_on[index]) + larger(high[index], high_on[index]);
     }
-}
-
-/// Returns the larger of two numbers that are not NaN. Unlike `f32::max`, it is one instruction.
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 /// Replaces the results of clusters whose neighbours at `distance` are nearer than all neighbours

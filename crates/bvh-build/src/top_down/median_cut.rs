@@ -91,13 +91,9 @@ impl Builder for Config {
             let first = nodes.len();
             nodes[node] = Node::inner(aabb, first as u32, 2);
             nodes.extend([placeholder; 2]);
-            stack.push(Frame {
-                node: first + 1,
-                start: start + half,
-                len: len - half,
-                level: level + 1,
-            });
-            stack.push(Frame { node: first, start, len: half, level: level + 1 });
+            let level = level + 1;
+            stack.push(Frame { node: first + 1, start: start + half, len: len - half, level });
+            stack.push(Frame { node: first, start, len: half, level });
         }
         Ok(Bvh::new(nodes, prim_ids))
     }

@@ -12,7 +12,6 @@ pub(super) const PARALLEL_OBJECTS: usize = 4096;
 /// A scene's objects, sorted along every axis: the input of any number of top-down builds.
 #[derive(Clone, Debug)]
 pub struct Presorted {
-    /// One box per object.
     pub(super) boxes: Vec<PackedAabb>,
     /// Per axis, the objects by increasing box centre, equal centres by index.
     pub(super) orders: [Vec<u32>; 3],

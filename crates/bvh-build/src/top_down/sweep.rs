@@ -45,7 +45,6 @@ pub(super) struct Sweep<'a, C> {
     /// Per axis, the lowest axis known to order the node's objects identically, usually the same
     /// axis.
     pub(super) same_as: [u8; 3],
-    /// The node's box.
     pub(super) aabb: PackedAabb,
     /// Per axis, the blocks of its last scan.
     pub(super) blocks: &'a mut [Vec<Block>; 3],

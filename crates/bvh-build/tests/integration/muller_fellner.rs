@@ -27,14 +27,26 @@ fn topology(tree: &Bvh) -> Vec<Vec<u32>> {
     sets
 }
 
+/// The cost of a split from the areas and the loads of its sides.
+type Formula = fn([f64; 2], [f64; 2]) -> f64;
+
+/// The readings of Table 2.
+const READINGS: [(AreaOnly, Formula); 6] = [
+    (AreaOnly::Sum, |[a, b], _| a + b),
+    (AreaOnly::InnerSum, |areas, loads| inner(areas[0], loads[0]) + inner(areas[1], loads[1])),
+    (AreaOnly::Max, |[a, b], _| a.max(b)),
+    (AreaOnly::SumOfSquares, |[a, b], _| a * a + b * b),
+    (AreaOnly::Difference, |[a, b], _| (a - b).abs()),
+    (AreaOnly::Product, |[a, b], _| a * b),
+];
+
+fn inner(area: f64, load: f64) -> f64 {
+    if load == 1.0 { 0.0 } else { area }
+}
+
 /// Follows the paper's Table 1 literally: examines every candidate of every axis, without blocks
-/// and without pruning. Returns the same topology as [`topology`], for a `weight` per object and a
-/// cost of a split from areas and loads.
-fn brute_force(
-    boxes: &[Aabb],
-    weights: &[f32],
-    cost: fn([f64; 2], [f64; 2]) -> f64,
-) -> Vec<Vec<u32>> {
+/// and without pruning. Returns the same topology as [`topology`].
+fn brute_force(boxes: &[Aabb], weights: &[f32], cost: Formula) -> Vec<Vec<u32>> {
     let load = |ids: &[u32]| ids.iter().map(|&id| f64::from(weights[id as usize])).sum::<f64>();
     let mut stack: Vec<Vec<u32>> = vec![(0..boxes.len() as u32).collect()];
     let mut sets = Vec::new();
@@ -127,39 +139,20 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
-    fn the_tree_is_the_brute_force_one(boxes in scene(120)) {
-        let tree = valid(&Config::default(), &boxes);
+    fn the_tree_of_every_heuristic_is_the_brute_force_one(
+        boxes in scene(100), every in 1u32..5, cost in 0u8..9,
+    ) {
         let ones = vec![1.0; boxes.len()];
-        prop_assert_eq!(topology(&tree), brute_force(&boxes, &ones, |[a, b], [m, n]| a * m + b * n));
-    }
-
-    #[test]
-    fn the_weighted_tree_is_the_brute_force_one(boxes in scene(60), every in 1u32..5, cost in 0u8..9) {
-        let mut weights = vec![1.0; boxes.len()];
-        for weight in weights.iter_mut().step_by(every as usize) {
-            *weight = f32::from(cost);
-        }
-        let costs = MadeUpCosts { every, cost: cost.into() };
-        let config = Config { heuristic: Heuristic::AreaTimesCost(costs), ..Config::default() };
-        let expected = brute_force(&boxes, &weights, |[a, b], [m, n]| a * m + b * n);
-        prop_assert_eq!(topology(&valid(&config, &boxes)), expected);
-    }
-
-    #[test]
-    fn every_reading_of_table_2_is_the_brute_force_one(boxes in scene(70)) {
-        type Formula = fn([f64; 2], [f64; 2]) -> f64;
-        let readings: [(AreaOnly, Formula); 6] = [
-            (AreaOnly::Sum, |[a, b], _| a + b),
-            (AreaOnly::InnerSum, |[a, b], [m, n]| if m == 1.0 { 0.0 } else { a } + if n == 1.0 { 0.0 } else { b }),
-            (AreaOnly::Max, |[a, b], _| a.max(b)),
-            (AreaOnly::SumOfSquares, |[a, b], _| a * a + b * b),
-            (AreaOnly::Difference, |[a, b], _| (a - b).abs()),
-            (AreaOnly::Product, |[a, b], _| a * b),
-        ];
-        let ones = vec![1.0; boxes.len()];
-        for (reading, formula) in readings {
-            let config = Config { heuristic: Heuristic::AreaOnly(reading), ..Config::default() };
-            prop_assert_eq!(topology(&valid(&config, &boxes)), brute_force(&boxes, &ones, formula), "{:?}", reading);
+        let mut weights = ones.clone();
+        weights.iter_mut().step_by(every as usize).for_each(|weight| *weight = cost.into());
+        let product: Formula = |[a, b], [m, n]| a * m + b * n;
+        let weighted = Heuristic::AreaTimesCost(MadeUpCosts { every, cost: cost.into() });
+        let of_counts = [(Heuristic::AreaTimesCount, &ones, product), (weighted, &weights, product)];
+        let readings = READINGS.map(|(read, formula)| (Heuristic::AreaOnly(read), &ones, formula));
+        for (heuristic, weights, formula) in of_counts.into_iter().chain(readings) {
+            let config = Config { heuristic, ..Config::default() };
+            let expected = brute_force(&boxes, weights, formula);
+            prop_assert_eq!(topology(&valid(&config, &boxes)), expected, "{:?}", heuristic);
         }
     }
 

@@ -157,17 +157,4 @@ mod tests {
         // An unlucky seed exceeds four standard errors once in 16 000.
         assert!(error < 4.0 * cost.boxes.standard_error, "{cost:?} {expected}");
     }
-
-    #[test]
-    fn no_ray_needs_more_tests_for_its_nearest_hit_than_for_all() {
-        let scene = Scene::load("escher:2000").unwrap();
-        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
-        for seed in 0..300 {
-            let [nearest, all] = [Query::Nearest, Query::All].map(|query| {
-                let ray = RandomRays { family: Family::Inside, query, count: 1 };
-                empirical_cost(&ray, &scene.primitives, &tree, seed).boxes.mean
-            });
-            assert!(nearest <= all, "{seed}: {nearest} {all}");
-        }
-    }
 }

@@ -140,16 +140,6 @@ pub fn of_renderer(
 /// when `is_over` returns true.
 pub fn of_anything(
     count: u32,
-    scene: &Scene,
-    tree: &Bvh,
-    seed: u64,
-    is_over: &dyn Fn() -> bool,
-) -> Vec<TracedRay> {
-    through(count, &scene.primitives, tree, seed, is_over)
-}
-
-fn through(
-    count: u32,
     primitives: &Primitives,
     tree: &Bvh,
     seed: u64,
@@ -209,7 +199,7 @@ pub fn anywhere(
     seed: u64,
     is_over: &dyn Fn() -> bool,
 ) -> Result<Option<RayDensity>, DensityError> {
-    let rays = through(TRAINED, primitives, tree, seed, is_over);
+    let rays = of_anything(TRAINED, primitives, tree, seed, is_over);
     // After an interruption some rays are missing, or all of them, which is an error otherwise.
     if is_over() { Ok(None) } else { density(&rays, tree).map(Some) }
 }
@@ -304,10 +294,9 @@ fn scaled_length(vector: Vec3) -> (f32, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SceneKind;
     use bvh_build::{Builder, muller_fellner};
     use bvh_config::Check;
-    use bvh_core::{Node, Primitives, Triangle};
+    use bvh_core::{Node, Triangle};
 
     /// Returns the segments of rays through four triangles whose corners are multiples of `unit`.
     fn segments_at_scale(unit: f32) -> Vec<[[f32; 3]; 2]> {
@@ -316,9 +305,9 @@ mod tests {
         let triangles: Vec<Triangle> = (0..4)
             .map(|skipped| Triangle([1, 2, 3].map(|step| corners[(skipped + step) % 4])))
             .collect();
-        let scene = Scene::new("tetrahedron", SceneKind::File, Primitives::Triangles(triangles));
-        let tree = muller_fellner::Config::default().build(&scene.primitives.boxes()).unwrap();
-        of_anything(50, &scene, &tree, 1, &|| false)
+        let objects = Primitives::Triangles(triangles);
+        let tree = muller_fellner::Config::default().build(&objects.boxes()).unwrap();
+        of_anything(50, &objects, &tree, 1, &|| false)
             .iter()
             .filter(|traced| traced.kind != Kind::Shadow)
             .map(|traced| [traced.segment.from, traced.segment.to])
@@ -341,11 +330,10 @@ mod tests {
     #[test]
     fn fewer_rays_of_every_kind_are_traced_where_all_of_them_meet_all_objects() {
         let triangle = Triangle::from([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
-        let scene =
-            Scene::new("equal", SceneKind::File, Primitives::Triangles(vec![triangle; 30_000]));
+        let objects = Primitives::Triangles(vec![triangle; 30_000]);
         let leaf = Node::leaf(triangle.aabb(), 0, 30_000);
         let tree = Bvh { nodes: vec![leaf], prim_ids: (0..30_000).collect(), ..Bvh::default() };
-        let rays = of_anything(10_000, &scene, &tree, 1, &|| false);
+        let rays = of_anything(10_000, &objects, &tree, 1, &|| false);
         let begins_inside = |traced: &&TracedRay| {
             let origin = traced.ray.origin();
             origin.min_element() > 0.01 && origin.max_element() < 0.99

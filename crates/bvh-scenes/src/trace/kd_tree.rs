@@ -362,7 +362,6 @@ impl KdTree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_core::{clip_to_box, nearest_hit_of_all};
     use glam::Vec3;
     use proptest::prelude::*;
 
@@ -376,34 +375,12 @@ mod tests {
         prop::collection::vec(b, 0..120)
     }
 
-    /// Makes corners of these boxes, and points halfway between them; zeros have both signs.
-    fn point(coordinates: [i8; 3]) -> Vec3 {
-        Vec3::from(coordinates.map(|c| f32::from(c) * -0.375))
-    }
-
     proptest! {
         #[test]
-        fn trees_are_bounded_and_give_the_answers_of_brute_force(
-            boxes in boxes(),
-            rays in prop::collection::vec(
-                (prop::array::uniform3(-9i8..10), prop::array::uniform3(-4i8..5)),
-                100,
-            ),
-        ) {
+        fn trees_have_few_levels_and_references(boxes in boxes()) {
             let tree = KdTree::build(&boxes).unwrap();
             prop_assert!(tree.references() >= boxes.len() && tree.references() <= 16 * boxes.len());
             prop_assert!(tree.depth() as f64 <= 8.0 + 1.3 * libm::log2(boxes.len().max(1) as f64));
-            for (origin, towards) in rays {
-                // Rays go through corners, along faces and edges, and past them.
-                let Ok(ray) = Ray::half_line(point(origin), point(towards)) else { continue };
-                let solid = |id: u32, t_max| {
-                    clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max)
-                };
-                let expected = nearest_hit_of_all(boxes.len() as u32, &ray, solid, &mut ());
-                prop_assert_eq!(tree.nearest_hit(&ray, solid, &mut ()), expected, "{:?}", ray);
-                let any = tree.any_hit(&ray, |id| solid(id, f32::MAX).is_some(), &mut ());
-                prop_assert_eq!(any, expected.is_some(), "{:?}", ray);
-            }
         }
     }
 }

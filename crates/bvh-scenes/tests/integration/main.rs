@@ -5,7 +5,6 @@ mod dialects;
 mod glb;
 mod gltf;
 mod meshes;
-mod obj;
 mod orient;
 mod polygons;
 mod samples;

@@ -131,3 +131,23 @@ fn the_path_of_a_mesh_file_names_a_scene_and_a_missing_file_is_reported() {
     assert!(matches!(load(folder.path()), Err(MeshError::Read(_))));
     assert!(error(b" \r\n", "a.ply").starts_with("a.ply: empty; expected an OBJ, PLY"));
 }
+
+#[test]
+fn a_face_of_too_many_vertices_is_rejected() {
+    let text = format!("v 0 0 0\nv 1 0 0\nf{}", " 1 2".repeat(1 << 15));
+    assert_eq!(read(&text, "a.obj").unwrap().triangles.len(), (1 << 16) - 2);
+    let message = error(text + " 1\n", "a.obj");
+    assert!(message.starts_with("a.obj:3: face of more than 65536"), "{message}");
+}
+
+#[test]
+fn triangles_without_area_are_counted_and_kept_at_every_scale() {
+    for scale in ["1e-45", "1", "3e38"] {
+        let points = format!("v 0 0 0\nv {scale} 0 0\nv -{scale} 0 0\nv 0 {scale} 0\n");
+        let faces = "f 1 1 1\nf 1 2 2\nf 1\nf 1 2 3\nf 1 2 4\n";
+        let read = read(format!("{points}{faces}"), "a.obj").unwrap();
+        assert_eq!(read.triangles.len(), 4);
+        let remark = "faces of fewer than three vertices skipped: 1; triangles without area: 3";
+        assert_eq!(read.remark().unwrap(), remark, "scale {scale}");
+    }
+}

@@ -5,7 +5,6 @@ use crate::tree::{Metric, Working};
 use crate::tuning::MOVES_PER_TEMPERATURE;
 use bvh_core::with_vector_instructions;
 
-/// Makes moves of one kind.
 pub(crate) trait Mover: Send {
     /// Begins a series of moves on a tree in preorder, near these nodes, or anywhere if there are
     /// none. O(n), in the memory of an earlier series.

@@ -22,9 +22,7 @@ use crate::tuning::{FINAL_PASSES_PART, FINAL_PASSES_WORK, LAST_ROUND, ROUNDS, WO
 /// The temperatures and the length of one annealing run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Schedule {
-    /// First temperature.
     pub hot: f64,
-    /// Last temperature.
     pub cold: f64,
     /// The work over which the temperature falls, and the maximum number of moves.
     pub quota: Quota,

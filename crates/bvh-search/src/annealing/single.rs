@@ -36,7 +36,6 @@ impl Config {
     }
 }
 
-/// Moves one subtree at a time.
 #[derive(Debug, Default)]
 pub(crate) struct SingleMover {
     sampler: NodeSampler,

@@ -19,7 +19,6 @@ use rand::RngExt;
 /// Random streams per round: one for the whole tree, one for every subtree.
 pub(crate) const STREAMS: u64 = 1 << 24;
 
-/// One round of annealing.
 pub(crate) struct Round {
     /// The first and the last temperature.
     pub heat: [f64; 2],

@@ -139,7 +139,6 @@ impl Subtree {
         Some(subtree)
     }
 
-    /// Returns whether two subtrees of one tree share a leaf.
     fn overlaps(&self, other: &Self) -> bool {
         // If two subtrees share a leaf, one of them contains the root of the other.
         self.inner.contains(&other.inner[0]) || other.inner.contains(&self.inner[0])

@@ -28,7 +28,6 @@ impl Config {
     }
 }
 
-/// Performs one [`pass`] over all nodes, children before their parents.
 fn pass_bottom_up(tree: &mut Working<impl Metric>, quota: Quota, observer: &dyn Observer) -> Tally {
     let mut order = tree.preorder();
     order.reverse();

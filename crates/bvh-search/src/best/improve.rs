@@ -26,7 +26,6 @@ use bvh_core::{Aabb, Bvh};
 /// follow the numbers of all other runs, so that no random stream is used twice.
 const TRIALS: u64 = 1 << 20;
 
-/// An annealing run to make, with its schedule.
 struct ScheduledRun {
     /// Number of the run, which selects its random streams.
     number: u64,
@@ -48,7 +47,6 @@ enum Before {
 }
 
 impl Before {
-    /// Makes `tree` the tree from before the run again.
     fn restore(self, tree: &mut Working<impl Metric>, best: &Incumbent, boxes: &[Aabb]) {
         // A binary tree stays binary, so that no conversion fails.
         match self {
@@ -59,14 +57,11 @@ impl Before {
     }
 }
 
-/// A search in progress.
 struct Improvement<'a, 'p, 'r, 's> {
     config: &'a Config,
     boxes: &'a [Aabb],
     seed: u64,
-    /// Number of objects.
     n: u64,
-    /// The remaining work.
     left: u64,
     /// True if the objective is the cost of the wide layout, not the area.
     by_layout: bool,
@@ -386,9 +381,7 @@ impl Improvement<'_, '_, '_, '_> {
     }
 }
 
-/// One annealing run of the plan.
 struct Planned {
-    /// First temperature.
     hot: f64,
     /// The fraction of all work or time at which the run ends.
     until: f64,

@@ -166,18 +166,13 @@ impl Config {
         if run.stopped() == Some(StopReason::Cancelled) {
             return Ok(best.tree);
         }
-        if problem.splits.is_some() {
-            let metric = metric.with_leaves();
-            let mut tree = Working::from_bvh(&best.tree, metric)?;
-            let working = other.as_ref().map(|tree| Working::from_bvh(tree, metric)).transpose()?;
-            if let Some(other) = other {
-                run.keep_aside(Kept::new(other, problem));
-            }
-            improve(self, &mut tree, working, seed, problem, &mut best, run);
-        } else {
-            let mut tree = Working::from_bvh(&best.tree, metric)?;
-            improve(self, &mut tree, None, seed, problem, &mut best, run);
+        let metric = if problem.splits.is_some() { metric.with_leaves() } else { metric };
+        let mut tree = Working::from_bvh(&best.tree, metric)?;
+        let working = other.as_ref().map(|tree| Working::from_bvh(tree, metric)).transpose()?;
+        if let Some(other) = other {
+            run.keep_aside(Kept::new(other, problem));
         }
+        improve(self, &mut tree, working, seed, problem, &mut best, run);
         Ok(best.tree)
     }
 }

@@ -36,7 +36,6 @@ struct Clades {
     occurrences: Vec<Occurrence>,
     /// The number of the clade below each node, by tree and node.
     numbers: Vec<Vec<u32>>,
-    /// The number of different clades.
     count: usize,
 }
 
@@ -164,7 +163,6 @@ fn scattered(number: u32) -> u128 {
     u128::from(high) << 64 | u128::from(low)
 }
 
-/// Returns the output of SplitMix64 for a state.
 fn split_mix(state: u64) -> u64 {
     let state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -238,11 +236,8 @@ mod tests {
             let found = recombine(&trees);
             validate(&found.to_bvh(), boxes).unwrap();
             let least = brute_force(&trees, boxes);
-            assert!(
-                (found.area() - least).abs() <= 1e-12 * least,
-                "{seed}: {} {least}",
-                found.area()
-            );
+            let off = (found.area() - least).abs();
+            assert!(off <= 1e-12 * least, "{seed}: {off} of {least}");
             better += usize::from(trees.iter().all(|tree| found.area() < 0.999 * tree.area()));
         }
         assert!(better > 20, "{better}");

@@ -13,7 +13,7 @@ use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion::pass;
 use crate::parallel::threads;
 use crate::run::{Kept, Observer, Problem, Run, SearchError};
-use crate::tree::{Area, Working};
+use crate::tree::{HalfArea, Working};
 use crate::tuning::{
     ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS, FRONT,
     MOVES_PER_READING, SEVERAL_THREADS, WARM_SAMPLE,
@@ -50,7 +50,7 @@ pub(super) fn search<'p>(
     }
     let clustered = morton.build(&CLUSTERING, None, &Watch::default())?;
     let mut best = Incumbent::begin(Kept::new(clustered, problem), problem, run);
-    let mut tree = Working::from_bvh(&best.tree, Area)?;
+    let mut tree = Working::from_bvh(&best.tree, HalfArea::default())?;
     let is_local_optimum = reinsert_largest(&mut tree, end, run);
     best.offer(&tree, run);
     Ok(Some((best, is_local_optimum)))

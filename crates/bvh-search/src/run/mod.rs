@@ -4,27 +4,23 @@
 mod budget;
 #[cfg(feature = "std")]
 mod deadline;
-mod error;
 mod observer;
 mod problem;
-mod stream;
 #[cfg(test)]
 mod tests;
 
 pub use budget::{Budget, Quota, StopReason, Tally};
 use bvh_build::ploc::Config as Clustering;
 use bvh_build::{BuildError, Builder, Watch};
-use bvh_config::Check;
-use bvh_core::Bvh;
+use bvh_config::{Check, OutOfRange};
+use bvh_core::{Bvh, InvalidBvh};
 #[cfg(feature = "std")]
 pub use deadline::Deadline;
-pub(crate) use error::Found;
-pub use error::SearchError;
 pub use observer::{Event, Observer};
 pub(crate) use observer::{WORK_PER_POLL, built_unless_cancelled, watched};
 pub use problem::{Judge, Problem, Shortcut, Splits};
-pub use stream::Stream;
-pub(crate) use stream::stream;
+use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
 
 /// A search. Every builder is a search of one evaluation.
 pub trait Search: Check {
@@ -307,4 +303,39 @@ pub fn solve_or_keep(
     let stop = run.stopped().unwrap_or(otherwise);
     let Run { evaluations, work, incumbent: cost, optimal: proof, history, .. } = run;
     Ok(Outcome { tree, cost, evaluations, work, stop, proof, history })
+}
+
+pub(crate) type Found = Result<Bvh, SearchError>;
+
+/// The reason why a search did not start. A started search always returns a tree.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SearchError {
+    /// The builder rejects the scene.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// The tree to optimise is not a valid tree over these boxes.
+    #[error(transparent)]
+    Invalid(#[from] InvalidBvh),
+    /// Local search requires binary trees.
+    #[error("inner node {node} has {children} children; local search accepts binary trees only")]
+    NotBinary {
+        /// Index of the node.
+        node: usize,
+        /// Its number of children.
+        children: u32,
+    },
+    /// A parameter of the search is out of its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+}
+
+/// ChaCha with 8 rounds: the same numbers on every machine and in every version.
+pub type Stream = ChaCha8Rng;
+
+/// Returns the stream `index` of the generator seeded by `seed`. Streams of one seed do not
+/// overlap, so independent trials can draw in any order, or in parallel.
+pub(crate) fn stream(seed: u64, index: u64) -> Stream {
+    let mut rng = Stream::seed_from_u64(seed);
+    rng.set_stream(index);
+    rng
 }

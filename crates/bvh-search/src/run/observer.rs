@@ -1,6 +1,6 @@
 //! [`Observer`]: the caller's way to follow a search and to stop it.
 
-use super::error::SearchError;
+use super::SearchError;
 use bvh_build::{BuildError, Watch};
 use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::scatter::Does;
+use rand::Rng;
 use std::cell::Cell;
 
 /// A tree that tells its number.
@@ -114,4 +115,14 @@ fn quotas_are_reached_by_either_limit_and_never_fall_below_zero() {
     let mut sum = done(1, 2);
     sum += Tally { moves: 10, kept: 20, work: 30 };
     assert_eq!(sum, Tally { moves: 11, kept: 20, work: 32 });
+}
+
+#[test]
+fn the_first_draws_are_pinned() {
+    let draws = |seed, index| {
+        let mut rng = stream(seed, index);
+        [(); 3].map(|()| rng.next_u32())
+    };
+    assert_eq!(draws(1, 2), [2_436_003_126, 3_764_084_094, 3_950_055_637]);
+    assert_ne!(draws(1, 3), draws(1, 2));
 }

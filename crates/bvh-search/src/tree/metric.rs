@@ -3,53 +3,36 @@
 //! Searches are generic over the metric, so the area costs no indirection.
 
 use bvh_core::PackedAabb;
-pub(crate) use bvh_core::cost::Area;
 use bvh_core::cost::Measure;
 
-/// The size of a box: finite, not negative, and no smaller for a box that contains another.
+/// The size of a box: finite, not negative, and no smaller for a box that contains another. The cost
+/// of leaves is known at run time only, because a type for either cost would compile every search
+/// once more.
 pub(crate) trait Metric: Copy + Send + Sync {
-    /// The same sizes for trees that divide objects among leaves.
-    type WithLeaves: Metric;
     /// Returns the metric that counts leaves as much as inner nodes, as the surface area heuristic
-    /// does with equal constants.
-    fn with_leaves(self) -> Self::WithLeaves;
+    /// does with equal constants, for trees that divide objects among leaves.
+    fn with_leaves(self) -> Self;
     /// The cost of a leaf per unit of its size, relative to an inner node; 0 where every tree has
     /// the same leaves.
-    #[inline(always)]
-    fn leaf_cost(self) -> f64 {
-        0.0
-    }
+    fn leaf_cost(self) -> f64;
     /// The size of a box that is not empty.
     fn of(self, aabb: &PackedAabb) -> f64;
 }
 
-impl Metric for Area {
-    type WithLeaves = AreaWithLeaves;
-
-    fn with_leaves(self) -> AreaWithLeaves {
-        AreaWithLeaves
-    }
-
-    #[inline(always)]
-    fn of(self, aabb: &PackedAabb) -> f64 {
-        aabb.half_area()
-    }
+/// The half area; by default of inner nodes only.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct HalfArea {
+    leaf_cost: f64,
 }
 
-/// The half area for trees that divide objects among leaves.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AreaWithLeaves;
-
-impl Metric for AreaWithLeaves {
-    type WithLeaves = Self;
-
+impl Metric for HalfArea {
     fn with_leaves(self) -> Self {
-        self
+        Self { leaf_cost: 1.0 }
     }
 
     #[inline(always)]
     fn leaf_cost(self) -> f64 {
-        1.0
+        self.leaf_cost
     }
 
     #[inline(always)]
@@ -58,8 +41,7 @@ impl Metric for AreaWithLeaves {
     }
 }
 
-/// The caller's measure. Its cost of leaves is known at run time only: a measure takes much longer
-/// than the multiplication, and a type for either cost would compile every search once more.
+/// The caller's measure.
 #[derive(Clone, Copy)]
 pub(crate) struct Measured<'a> {
     measure: &'a dyn Measure,
@@ -74,8 +56,6 @@ impl<'a> Measured<'a> {
 }
 
 impl Metric for Measured<'_> {
-    type WithLeaves = Self;
-
     fn with_leaves(self) -> Self {
         Self { leaf_cost: 1.0, ..self }
     }
@@ -106,7 +86,7 @@ macro_rules! search_by_metric {
                     Some(measure) => {
                         self.search_by(crate::tree::Measured::new(measure), problem, seed, run)
                     }
-                    None => self.search_by(crate::tree::Area, problem, seed, run),
+                    None => self.search_by(crate::tree::HalfArea::default(), problem, seed, run),
                 }
             }
         }

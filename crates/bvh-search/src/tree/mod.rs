@@ -8,23 +8,19 @@
 //! move allocates memory.
 
 mod convert;
-mod layout_cost;
 mod metric;
 mod order;
 mod position;
-mod shape;
 mod subsets;
 
+use crate::parallel;
 use bvh_core::PackedAabb;
-use bvh_core::cost::Sum;
-#[cfg(test)]
-pub(crate) use metric::AreaWithLeaves;
-pub(crate) use metric::{Area, Measured, Metric, search_by_metric};
+use bvh_core::cost::{LayoutTree, Sum, layout_row};
+pub(crate) use convert::Shape;
+pub(crate) use metric::{HalfArea, Measured, Metric, search_by_metric};
 pub(crate) use position::{PositionSearch, Scope};
-pub(crate) use shape::Shape;
 pub(crate) use subsets::Subsets;
 
-/// No node.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// The parent of the root.
@@ -72,7 +68,7 @@ impl Node {
 
 /// A mutable binary tree. Leaves hold one object each.
 #[derive(Clone, Debug)]
-pub(crate) struct Working<M = Area> {
+pub(crate) struct Working<M = HalfArea> {
     metric: M,
     pub nodes: Vec<Node>,
     /// [`area`](Self::area) when the current change began, and what the change has added since.
@@ -129,6 +125,12 @@ impl<M: Metric> Working<M> {
         self.area.value() + self.added
     }
 
+    /// Returns the cost of the tree's layout, computed on all threads. O(nodes).
+    pub fn layout_cost(&self) -> f64 {
+        self.root()
+            .map_or(0.0, |root| layout_row(self, root as usize, &parallel::call_both).value())
+    }
+
     /// [`area`](Self::area), recomputed. O(n).
     #[cfg(test)]
     pub fn internal_area(&self) -> f64 {
@@ -174,7 +176,6 @@ impl<M: Metric> Working<M> {
         node
     }
 
-    /// Replaces the child `old` of `parent` by `new`.
     #[inline(always)]
     fn replace_child(&mut self, parent: u32, old: u32, new: u32) {
         let children = &mut self.write(parent).children;
@@ -288,6 +289,22 @@ impl<M: Metric> Working<M> {
         (self.area, self.added, self.change) = (Sum::default(), 0.0, 0);
         self.area.add(area.value());
         self.journal.clear();
+    }
+}
+
+impl<M: Metric> LayoutTree for Working<M> {
+    #[inline(always)]
+    fn size(&self, node: usize) -> f64 {
+        self.nodes[node].area
+    }
+
+    #[inline(always)]
+    fn children(&self, node: usize) -> Result<[usize; 2], u32> {
+        let node = &self.nodes[node];
+        if node.is_leaf() {
+            return Err(1);
+        }
+        Ok(node.children.map(|child| child as usize))
     }
 }
 

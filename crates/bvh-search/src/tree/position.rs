@@ -40,7 +40,6 @@ pub(crate) struct PositionSearch {
     pub visits: u64,
 }
 
-/// A node of the path.
 #[derive(Clone, Copy, Debug)]
 struct Step {
     node: u32,

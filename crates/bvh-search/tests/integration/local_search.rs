@@ -7,7 +7,6 @@ use bvh_search::{
     Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, best, genetic,
     optimize, solve,
 };
-use proptest::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 const METHODS: [&str; 7] =
@@ -89,21 +88,13 @@ fn budgets_and_observers_end_a_search_where_they_say() {
         for max_work in [0, 1, 5_000, 100_000] {
             let outcome = run(&method, &boxes, max_work);
             // At most one more move, or the start alone.
-            assert!(
-                outcome.work <= max_work.max(1999) + 2000,
-                "{} {max_work} {}",
-                method.name(),
-                outcome.work
-            );
+            let most = max_work.max(1999) + 2000;
+            assert!(outcome.work <= most, "{}: {} of {most}", method.name(), outcome.work);
         }
         let budget = Budget { max_evaluations: Some(777), ..Budget::UNLIMITED };
         let outcome = solve(&method, &Problem::new(&boxes), 1, budget, &()).unwrap();
-        assert!(
-            (777..=778).contains(&outcome.evaluations),
-            "{} {}",
-            method.name(),
-            outcome.evaluations
-        );
+        let found = outcome.evaluations;
+        assert!((777..=778).contains(&found), "{}: {found}", method.name());
         assert_eq!(outcome.stop, StopReason::Evaluations);
         let after_the_start = AfterTheStart(false.into());
         let outcome =
@@ -111,26 +102,6 @@ fn budgets_and_observers_end_a_search_where_they_say() {
         assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());
         validate(&outcome.tree, &boxes).unwrap();
     }
-}
-
-#[test]
-fn a_budget_barely_above_what_the_best_does_without_one_is_kept() {
-    let boxes = scatter(1000, 4);
-    for work_per_object in [100, 400, 2000, 6000] {
-        let config = best::Config { work_per_object, ..Default::default() };
-        // `best` does not count the start and the first descent in its work per object.
-        let max_work = work_per_object * 1000 + 60_000;
-        let outcome = solve(&config, &Problem::new(&boxes), 5, work(max_work), &()).unwrap();
-        assert!(outcome.work <= max_work + 2000, "{} of {max_work}", outcome.work);
-    }
-}
-
-#[test]
-fn a_small_budget_gives_no_worse_a_tree_than_a_smaller_one() {
-    let boxes = scatter(300, 1);
-    let best = Method::Best(best::Config::default());
-    let costs = [1, 600, 1200, 2400, 4800, 5900].map(|max_work| run(&best, &boxes, max_work).cost);
-    assert!(costs.is_sorted_by(|before, after| before >= after), "{costs:?}");
 }
 
 #[test]
@@ -218,21 +189,4 @@ fn a_population_that_no_memory_holds_is_named() {
     let config = genetic::Config { population: 1_000_000, ..Default::default() };
     let error = solve(&config, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap_err();
     assert_eq!(error.to_string(), "population is 1000000; accepted: at most 262144");
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
-    #[test]
-    fn no_scene_ends_above_its_start(n in 0u32..200, salt: u32, quantum in 1u32..20) {
-        // Coarse coordinates: many ties, coincident boxes and zero extents.
-        let round = |c: f32| (c * quantum as f32).floor();
-        let boxes: Vec<Aabb> = scatter(n, salt)
-            .iter()
-            .map(|b| Aabb { min: b.min.to_array().map(round).into(), max: b.max.to_array().map(round).into() })
-            .collect();
-        for method in methods() {
-            let outcome = run(&method, &boxes, 50_000);
-            prop_assert!(outcome.cost <= outcome.history[0].cost);
-        }
-    }
 }

@@ -1,13 +1,15 @@
 //! Mesh files of arbitrary bytes, in every format.
 
-use bvh_scenes::load::parse;
+use bvh_scenes::load::{orient, parse};
+use glam::DMat3;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Parses the bytes as a file. Checks that the mesh is finite, and that it stays the same if it is
-/// written and read again.
+/// Turns the bytes as a file, which may be an error, and parses them. Checks that the mesh is finite,
+/// and that it stays the same if it is written and read again.
 pub fn mesh(bytes: &[u8]) {
     let path = Path::new("scene.obj");
+    let _ = orient(bytes, path, path, &mut |_, _| Some(DMat3::from_rotation_x(1.0)));
     let mesh = match parse(bytes, path) {
         Ok(mesh) => mesh,
         Err(error) => {

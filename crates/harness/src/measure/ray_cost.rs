@@ -125,7 +125,9 @@ impl Config {
             .build(&scene.boxes)
             .map_err(|error| error.to_string())?;
         let rays = match trained {
-            TrainedOn::Default => of_anything(self.trained, scene, &tree, seed, &|| false),
+            TrainedOn::Default => {
+                of_anything(self.trained, &scene.primitives, &tree, seed, &|| false)
+            }
             TrainedOn::Camera | TrainedOn::Recorded => {
                 let Cameras { same, lights, .. } = self.cameras_of(scene);
                 rendered(&same, &lights, scene, &tree, self.trained, seed)

@@ -58,7 +58,6 @@ struct Reference {
     object: u32,
 }
 
-/// A node to divide.
 #[derive(Debug)]
 struct Open {
     references: Vec<Reference>,
@@ -66,7 +65,6 @@ struct Open {
     stalls: u8,
 }
 
-/// The two sides of a node, and their cost.
 #[derive(Debug)]
 struct Sides {
     cost: f64,
@@ -83,12 +81,10 @@ impl Sides {
     }
 }
 
-/// A build in progress.
 struct Build<'a> {
     objects: &'a dyn Clip,
     /// Number of references that may be added.
     extra: usize,
-    /// Least common area for which spatial splits are tried.
     least_overlap: f64,
     /// The powers |side|^power, indexed by |side|.
     powers: Vec<f64>,
@@ -96,7 +92,6 @@ struct Build<'a> {
 }
 
 impl<'a> Build<'a> {
-    /// Prepares a build with `extra` more references than `count` objects.
     fn new(objects: &'a dyn Clip, extra: usize, count: usize) -> Self {
         let powers = (0..=count).map(|n| libm::pow(n as f64, POWER)).collect();
         Self { objects, extra, least_overlap: 0.0, powers, axes: Default::default() }

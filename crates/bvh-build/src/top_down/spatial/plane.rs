@@ -65,6 +65,8 @@ impl Build<'_> {
             whole[first][0] = whole[first][0].union(&reference.aabb);
             whole[last][1] = whole[last][1].union(&reference.aabb);
         }
+        // A side with all references divides nothing.
+        let divides = |sides: [usize; 2]| sides.iter().all(|side| (1..all).contains(side));
         // A side costs at least as much as with the references alone that no plane cuts. If no
         // plane divides anything for less than `most` even so, the parts need not be clipped.
         let mut behind = vec![Aabb::EMPTY; bins + 1];
@@ -79,8 +81,7 @@ impl Build<'_> {
             entered += parts[bin - 1].1;
             gone += parts[bin - 1].2;
             let left = all - gone;
-            (1..all).contains(&entered)
-                && (1..all).contains(&left)
+            divides([entered, left])
                 && self.cost(&before, entered) + self.cost(&behind[bin], left) < most
         });
         if !may_pay {
@@ -113,17 +114,11 @@ impl Build<'_> {
         for bin in 1..bins {
             before = before.union(&parts[bin - 1].0);
             entered += parts[bin - 1].1;
-            let (behind, left) = &after[bin];
-            // A side with all references divides nothing.
-            if entered == 0
-                || *left == 0
-                || entered >= all
-                || *left >= all
-                || entered + left - all > self.extra
-            {
+            let (ref behind, left) = after[bin];
+            if !divides([entered, left]) || entered + left - all > self.extra {
                 continue;
             }
-            let cost = self.cost(&before, entered) + self.cost(behind, *left);
+            let cost = self.cost(&before, entered) + self.cost(behind, left);
             if best.is_none_or(|best| cost < best.cost) {
                 best = Some(Plane { cost, axis, position: border(bin) });
             }
@@ -179,8 +174,7 @@ impl Build<'_> {
         }
         let [left, right] = sides.each_ref().map(Vec::len);
         let all = references.len();
-        if left == 0 || right == 0 || left >= all || right >= all || left + right - all > self.extra
-        {
+        if left.min(right) == 0 || left.max(right) >= all || left + right - all > self.extra {
             return None;
         }
         // Unsplitting may have left a side with a smaller box than the decisions assumed.

@@ -69,7 +69,6 @@ impl MeshBuilder {
         });
     }
 
-    /// Adds a torus about the z axis.
     pub fn torus(&mut self, radius: f64, thickness: f64, segments: usize, sides: usize) {
         let profile = (0..=sides).map(|i| cos_sin(fraction(i % sides, sides)));
         let profile: Vec<_> =
@@ -212,7 +211,6 @@ pub fn circle(radius: f64, sides: usize) -> Vec<(f64, f64)> {
     (0..sides).map(|i| cos_sin(fraction(i, sides))).map(|(c, s)| (radius * c, radius * s)).collect()
 }
 
-/// `i / n`, the parameter of the i-th of n steps.
 pub fn fraction(i: usize, n: usize) -> f64 {
     i as f64 / n as f64
 }
@@ -223,13 +221,11 @@ pub fn about_x(turns: f64) -> DMat3 {
     DMat3::from_cols(DVec3::X, dvec3(0.0, c, s), dvec3(0.0, -s, c))
 }
 
-/// Rotation about the y axis by an angle in turns.
 pub fn about_y(turns: f64) -> DMat3 {
     let (c, s) = cos_sin(turns);
     DMat3::from_cols(dvec3(c, 0.0, -s), DVec3::Y, dvec3(s, 0.0, c))
 }
 
-/// Rotation about the z axis by an angle in turns.
 pub fn about_z(turns: f64) -> DMat3 {
     let (c, s) = cos_sin(turns);
     DMat3::from_cols(dvec3(c, s, 0.0), dvec3(-s, c, 0.0), DVec3::Z)

@@ -27,7 +27,6 @@ fn name(component: u32) -> String {
     known.map_or_else(|| format!("component type {component}"), |(_, name, _)| (*name).into())
 }
 
-/// Returns the number of bytes of a known type.
 fn size(component: u32) -> usize {
     TYPES.iter().find(|(number, ..)| *number == component).map_or(4, |(.., size)| *size)
 }

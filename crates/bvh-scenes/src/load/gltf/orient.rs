@@ -96,7 +96,6 @@ struct File<'a> {
 }
 
 impl File<'_> {
-    /// Adds an element to a list, and returns its number.
     fn push(&mut self, list: &str, element: Value) -> usize {
         let elements = self.json[list].as_array_mut();
         elements.map_or(0, |elements| {

@@ -1,7 +1,7 @@
 use super::*;
 use crate::run::stream;
 use crate::scatter::scatter;
-use crate::tree::AreaWithLeaves;
+use crate::tree::HalfArea;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{layout_area, total_area};
 use bvh_core::{Triangle, validate_references};
@@ -28,7 +28,8 @@ fn passes_divide_and_reunite_within_the_limit_and_every_reference_saves_its_pric
             |tree: &bvh_core::Bvh| if by_layout { layout_area(tree) } else { total_area(tree) };
         let start = muller_fellner::Config::default().build(&boxes).unwrap();
         let mut before = cost(&start);
-        let mut tree = Working::from_bvh(&start, AreaWithLeaves).unwrap();
+        let metric = HalfArea::default().with_leaves();
+        let mut tree = Working::from_bvh(&start, metric).unwrap();
         let mut most_seen = 0;
         // With fewer allowed references than the tree has, nothing is divided, and leaves that
         // pay little are still reunited.
