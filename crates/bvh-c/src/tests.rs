@@ -701,7 +701,7 @@ fn invalid_arguments_are_rejected_by_name() {
         rejected(timeless.is_null(), "seconds is -1.0; accepted: 0 to 1e19");
         let inverted =
             bvs_tree_from_boxes([[0.0f32; 6], [2.0, 0., 0., 1., 1., 1.]].as_ptr().cast(), 2, 0.0);
-        rejected(inverted.is_null(), "box 1, [2, 0, 0] to [1, 1, 1], has min above max");
+        rejected(inverted.is_null(), "object 1, [2, 0, 0] to [1, 1, 1], has min above max");
         let boxed = bvs_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
         rejected(bvs_tracer_new(boxed).is_null(), "tree is over boxes");
         rejected(bvs_tree_load(null(), &BvsObjects::NONE).is_null(), "path is null");

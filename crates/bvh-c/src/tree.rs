@@ -559,12 +559,6 @@ unsafe fn objects_of(objects: &BvsObjects) -> Result<Objects, Failure> {
     if !boxes.is_null() {
         // SAFETY: an `Aabb` is `repr(C)` with 6 floats, and `boxes` points to that many for each.
         let boxes = unsafe { slice("boxes", boxes.cast::<Aabb>(), count) }?;
-        for (index, aabb @ Aabb { min, max }) in boxes.iter().enumerate() {
-            aabb.check().map_err(|reason| {
-                let accepted = "accepted: finite numbers, the lower corner first";
-                Failure::invalid(format!("box {index}, {min} to {max}, {reason}; {accepted}"))
-            })?;
-        }
         return Ok(Objects::Boxes(boxes.to_vec()));
     }
     Ok(Objects::Shapes(if vertices_f64.is_null() {
