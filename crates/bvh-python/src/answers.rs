@@ -32,7 +32,7 @@ pub struct Call<'a, 'py, N: Real> {
 impl<'py, N: Real> Call<'_, 'py, N> {
     pub fn nearest(
         self,
-        source: RaySource,
+        source: &RaySource,
         select: &Selection,
         hint: Hint,
     ) -> PyResult<(Reals<'py>, Column<'py, i32>)> {
@@ -57,7 +57,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
 
     pub fn any(
         self,
-        source: RaySource,
+        source: &RaySource,
         select: &Selection,
         hint: Hint,
     ) -> PyResult<Column<'py, bool>> {
@@ -72,7 +72,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
 
     pub fn all(
         self,
-        source: RaySource,
+        source: &RaySource,
     ) -> PyResult<(Reals<'py>, Column<'py, i32>, Column<'py, i64>)> {
         let Self { py, progress, layout, .. } = self;
         let parts = source.rays.div_ceil(FEW);
@@ -103,7 +103,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         Ok((t.into_pyarray(py).into_any(), objects.into_pyarray(py), numbers.into_pyarray(py)))
     }
 
-    pub fn counts(self, source: RaySource) -> PyResult<Column<'py, u32>> {
+    pub fn counts(self, source: &RaySource) -> PyResult<Column<'py, u32>> {
         let layout = self.layout;
         self.columns(source.rays, FEW, |number, counts| {
             N::all(layout, &source.batch::<N>(number, FEW)?, &mut Vec::new(), counts);
@@ -216,7 +216,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
     /// Answers with the weights and normals of the triangles with these indices, or −1.
     pub fn surfaces(
         self,
-        source: RaySource,
+        source: &RaySource,
         indices: &[i64],
     ) -> PyResult<(Column<'py, f64>, Column<'py, f64>, Reals<'py>)> {
         let Self { py, triangles, .. } = self;
