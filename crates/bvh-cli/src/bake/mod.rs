@@ -15,7 +15,7 @@ use bvh_core::Aabb;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_scenes::files::Reserved;
-use bvh_scenes::{Precision, Scene, tree_file};
+use bvh_scenes::{Precision, Scene};
 use bvh_search::{
     Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
 };
@@ -200,10 +200,7 @@ fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> R
         let (out, next) = (out.display(), continues(out));
         return Err(Error::Interrupted(format!("the best tree so far is in {out}; {next}")));
     }
-    let header = tree_file::header(out)?;
-    answer.record("method", header.method.as_str());
-    answer.record("cost", header.cost);
-    summarise(found, &header.method, answer);
+    summarise(found, answer);
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
     answer.record("file", out.display().to_string());
     answer.record("bytes", bytes);
@@ -215,9 +212,10 @@ fn continues(out: &Path) -> String {
     format!("`--from {0} --out {0}` continues, `--out {0}` begins again", out.display())
 }
 
-fn summarise(found: &Found, method: &str, answer: &mut Answer) {
+fn summarise(found: &Found, answer: &mut Answer) {
     let Found { plan, scene, chosen, baked, greedy, seconds, .. } = found;
     let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
+    let method = found.settled().name();
     let objects = scene.boxes.len();
     let references = tree.prim_ids.len();
     answer.say(&format!(
@@ -228,6 +226,7 @@ fn summarise(found: &Found, method: &str, answer: &mut Answer) {
         plan.seed
     ));
     answer.record("scene", scene.name.as_str());
+    answer.record("method", method);
     answer.record("objects", objects);
     answer.record("references", references);
     answer.record("frame", frame_facts(tree.frame.as_ref()));
@@ -246,6 +245,7 @@ fn summarise(found: &Found, method: &str, answer: &mut Answer) {
         answer.record("saved", saved(area, base));
     }
     // The cost in the file is that for random lines and whole objects.
+    answer.record("cost", chosen.objective.cost(tree));
     answer.record("minimised_cost", *cost);
     // The gain in area is no measure of a search for another cost.
     if let (Some(base), Some(unit)) = (baked.greedy_cost, found.unit()) {
