@@ -6,7 +6,19 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Bvh, DWideBvh};
 use bvh_scenes::files::{folder_of, regular};
 use bvh_scenes::{Precision, Scene, SceneError, tree_file};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
+
+/// Parses the name of one of these values.
+pub fn named<T: Clone + Send + Sync + 'static, const N: usize>(
+    values: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let names = values.each_ref().map(|(name, _)| *name);
+    PossibleValuesParser::new(names).try_map(move |found| {
+        let value = values.iter().find(|(name, _)| *name == found);
+        value.map(|(_, value)| value.clone()).ok_or("unknown")
+    })
+}
 
 /// Loads a scene by name or path, and prints the remark on it, if it has one.
 pub fn load_scene(name: &str, precision: Precision) -> Result<Scene, SceneError> {

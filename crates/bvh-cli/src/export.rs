@@ -2,12 +2,12 @@
 
 use crate::Error;
 use crate::answer::{Answer, gain, whole};
-use crate::arguments::{greedy, output_file, scene_of};
+use crate::arguments::{greedy, named, output_file, scene_of};
 use bvh_core::cost::Objective;
 use bvh_core::export::{ExportError, Layout, Target};
 use bvh_scenes::{files, tree_file};
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::TypedValueParser;
 use std::path::PathBuf;
 
 /// Write a tree for the tracer of another library: with the leaves that cost least there, no deeper
@@ -45,8 +45,7 @@ const MEASURED: [(&str, [f64; 2]); 5] = [
 
 /// Parses the names of the targets.
 pub fn tracers() -> impl TypedValueParser<Value = Target> {
-    PossibleValuesParser::new(Target::ALL.map(|target| target.name))
-        .try_map(|name| Target::named(&name))
+    named(Target::ALL.map(|target| (target.name, target)))
 }
 
 /// Writes the better of the tree and a greedy one for the tracer, and prints how they compare.

@@ -7,7 +7,7 @@ mod watch;
 
 use crate::Error;
 use crate::answer::{Answer, frame_facts, gain, saved, whole};
-use crate::arguments::{input_file, load_scene, output_file, output_or_free, precision_of};
+use crate::arguments::{input_file, load_scene, named, output_file, output_or_free, precision_of};
 use crate::export::tracers;
 use crate::interrupt::{hold, is_interrupted};
 use crate::rays::Rays;
@@ -59,7 +59,8 @@ pub struct BakeArgs {
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
     /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the
     /// default is `layout` with --rays, and `area` otherwise.
-    #[arg(long, value_name = "area|layout", value_parser = costs())]
+    #[arg(long, value_name = "area|layout")]
+    #[arg(value_parser = named([("area", Objective::InternalArea), ("layout", Objective::Layout)]))]
     pub cost: Option<Objective>,
     /// Divide objects among leaves where it pays, up to N references per object, 1 to 16. The cost
     /// then includes the leaves. With --budget, the default is 1; with --from, as many as the tree
@@ -69,11 +70,13 @@ pub struct BakeArgs {
     /// The axes of the boxes: `auto` turns them where that saves area, as it does around a building
     /// that stands obliquely in its file; `file` keeps the file's, as --for, --parts and other
     /// methods than best do. Without it, with --from, those of the tree.
-    #[arg(long, value_name = "auto|file", value_parser = frames(), conflicts_with = "from")]
+    #[arg(long, value_name = "auto|file", conflicts_with = "from")]
+    #[arg(value_parser = named([("auto", Frames::Auto), ("file", Frames::File)]))]
     pub frame: Option<Frames>,
     /// The numbers of the triangles: `single`, to which the coordinates of the file are rounded, or
     /// `double`, as they are in the file. With --from, the default is that of the tree.
-    #[arg(long, value_name = "single|double", value_parser = precisions())]
+    #[arg(long, value_name = "single|double")]
+    #[arg(value_parser = named([("single", Precision::Single), ("double", Precision::Double)]))]
     pub precision: Option<Precision>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
     /// and with as many references as pay there.
@@ -104,27 +107,6 @@ pub struct BakeArgs {
 }
 
 const ADVANCED: &str = "Advanced";
-
-fn costs() -> impl TypedValueParser<Value = Objective> {
-    PossibleValuesParser::new(["area", "layout"]).map(|cost| match cost.as_str() {
-        "layout" => Objective::Layout,
-        _ => Objective::InternalArea,
-    })
-}
-
-fn frames() -> impl TypedValueParser<Value = Frames> {
-    PossibleValuesParser::new(["auto", "file"]).map(|frame| match frame.as_str() {
-        "file" => Frames::File,
-        _ => Frames::Auto,
-    })
-}
-
-fn precisions() -> impl TypedValueParser<Value = Precision> {
-    PossibleValuesParser::new(["single", "double"]).map(|precision| match precision.as_str() {
-        "double" => Precision::Double,
-        _ => Precision::Single,
-    })
-}
 
 /// The method that can continue from a given tree and divide objects.
 const BEST: &str = "best";

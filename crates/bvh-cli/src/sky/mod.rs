@@ -6,7 +6,7 @@ mod write;
 
 use crate::Error;
 use crate::answer::{Answer, short, whole};
-use crate::arguments::{input_file, load_scene, output_file};
+use crate::arguments::{input_file, load_scene, named, output_file};
 use crate::bench::Layout;
 use crate::output::Progress;
 use crate::render::CameraArgs;
@@ -15,7 +15,6 @@ use bvh_scenes::rays::Camera;
 use bvh_scenes::{Precision, Scene, SceneError, SceneKind};
 use bvh_search::{BakeError, Deadline, Objects, Options, OwnedTree};
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use directions::{Date, Looks};
 use glam::{DMat3, DVec3, Vec3};
 use points::Points;
@@ -82,7 +81,8 @@ pub struct SkyArgs {
     #[arg(long, value_name = "MINUTES", default_value = "30", value_parser = directions::step)]
     pub step: u32,
     /// The axis that is up: y in glTF, and z in other files and in built-in scenes.
-    #[arg(long, value_name = "x|y|z", value_parser = axis(), hide_possible_values = true)]
+    #[arg(long, value_name = "x|y|z", hide_possible_values = true)]
+    #[arg(value_parser = named([("x", 0usize), ("y", 1), ("z", 2)]))]
     pub up: Option<usize>,
     /// Degrees from the scene's north over east to the true north. North is y where z is up, −z
     /// where y is up, and z where x is up.
@@ -97,10 +97,6 @@ pub struct SkyArgs {
     pub tree: Option<PathBuf>,
     #[command(flatten)]
     pub camera: CameraArgs,
-}
-
-fn axis() -> impl TypedValueParser<Value = usize> {
-    PossibleValuesParser::new(["x", "y", "z"]).map(|axis| usize::from(axis.as_bytes()[0] - b'x'))
 }
 
 fn degrees(text: &str) -> Result<f64, String> {
