@@ -117,7 +117,14 @@ fn recorded(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
     let numbers = match format {
         "csv" => Table::read(bytes, |width| width == 6, "six numbers")?.numbers,
         "npy" => read_npy(bytes, &[6])?.1,
-        _ => read_floats(bytes)?,
+        _ => {
+            let (floats, rest) = bytes.as_chunks();
+            if !rest.is_empty() {
+                let count = bytes.len();
+                return Err(format!("there are {count} bytes; accepted: a multiple of 24"));
+            }
+            floats.iter().map(|&float| f32::from_le_bytes(float)).collect()
+        }
     };
     let (segments, rest) = numbers.as_chunks::<6>();
     if !rest.is_empty() {
@@ -138,15 +145,6 @@ fn recorded(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
         to: [to_x, to_y, to_z],
     };
     Ok(segments.iter().map(segment).collect())
-}
-
-fn read_floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
-    let (floats, rest) = bytes.as_chunks();
-    if !rest.is_empty() {
-        // The caller rejects whole numbers that are no whole segments of 24 bytes.
-        return Err(format!("there are {} bytes; accepted: a multiple of 24", bytes.len()));
-    }
-    Ok(floats.iter().map(|&float| f32::from_le_bytes(float)).collect())
 }
 
 #[cfg(test)]
