@@ -119,11 +119,11 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
     let triangles = scene.triangles()?;
     let offset = args.offset(&scene)?;
     let (width, height) = args.camera.size;
-    let made = match (kind, &args.points) {
-        ("png", _) => None,
-        (_, Some(path)) => Some(Points::of_file(path)?),
-        _ if args.per == "vertex" => Some(Points::of_vertices(triangles)),
-        _ => Some(Points::of_triangles(triangles)),
+    let (what, made) = match (kind, &args.points) {
+        ("png", _) => ("pixels", None),
+        (_, Some(path)) => ("points", Some(Points::of_file(path)?)),
+        _ if args.per == "vertex" => ("vertices", Some(Points::of_vertices(triangles))),
+        _ => ("triangles", Some(Points::of_triangles(triangles))),
     };
     let pixels = u64::from(width) * u64::from(height);
     let count = made.as_ref().map_or(pixels, |points| points.at.len() as u64);
@@ -131,12 +131,6 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
     let start = Instant::now();
     let wide = args.layout(&scene, count * directions as u64)?;
     let seconds_to_build = start.elapsed().as_secs_f64();
-    let what = match (kind, &args.points) {
-        ("png", _) => "pixels",
-        (_, Some(_)) => "points",
-        _ if args.per == "vertex" => "vertices",
-        _ => "triangles",
-    };
     let points = made.unwrap_or_else(|| {
         let camera =
             Camera::new(&args.camera.view(&scene, axes.z_axis), axes.z_axis, width, height);
@@ -166,16 +160,13 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
         "{name}: {}",
         legend.line(kind, if args.sun.is_some() { " hours" } else { "" })
     ));
-    answer.say(&format!("{}", args.out.display()));
-    let facts = [
-        ("mean", mean),
-        ("minimum", legend.least),
-        ("maximum", legend.most),
-        ("offset", offset),
-        ("seconds_to_build", seconds_to_build),
-        ("seconds", seconds),
-    ];
-    facts.into_iter().for_each(|(name, value)| answer.record(name, value));
+    answer.say(&args.out.display().to_string());
+    answer.record("mean", mean);
+    answer.record("minimum", legend.least);
+    answer.record("maximum", legend.most);
+    answer.record("offset", offset);
+    answer.record("seconds_to_build", seconds_to_build);
+    answer.record("seconds", seconds);
     answer.record("points", count);
     answer.record("directions", directions);
     answer.record("columns", looks.columns);
