@@ -6,6 +6,7 @@ mod glb;
 #[path = "../program/mod.rs"]
 mod program;
 
+use glam::DVec3;
 pub use glb::glb;
 pub use program::*;
 use serde_json::{Map, Value};
@@ -28,6 +29,18 @@ pub fn wrong(at: &Path, line: &str, parts: &[&str]) {
     let output = run(at, &words(line));
     ended(&output, 2, parts);
     assert!(output.stdout.is_empty(), "{line}: {}", text(&output.stdout));
+}
+
+/// Returns an OBJ file of triangles.
+pub fn obj(triangles: impl IntoIterator<Item = [DVec3; 3]>) -> String {
+    let mut text = String::new();
+    for corners in triangles {
+        for DVec3 { x, y, z } in corners {
+            text += &format!("v {x} {y} {z}\n");
+        }
+        text += "f -3 -2 -1\n";
+    }
+    text
 }
 
 /// Returns the results of a command, with all digits.
