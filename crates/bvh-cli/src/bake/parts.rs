@@ -251,13 +251,11 @@ mod tests {
                 assert!(all.into_iter().eq(0..boxes.len()), "{case}");
                 let sizes = parts.iter().map(Vec::len);
                 assert!(sizes.clone().max().unwrap() <= sizes.min().unwrap() + 7, "{case}");
-                let trees: Vec<Bvh> = parts
-                    .iter()
-                    .map(|part| {
-                        let boxes: Vec<Aabb> = part.iter().map(|&object| boxes[object]).collect();
-                        config.build(&boxes).unwrap()
-                    })
-                    .collect();
+                let tree = |part: &Vec<usize>| {
+                    let boxes: Vec<Aabb> = part.iter().map(|&object| boxes[object]).collect();
+                    config.build(&boxes).unwrap()
+                };
+                let trees: Vec<Bvh> = parts.iter().map(tree).collect();
                 let roots: Vec<Aabb> = trees.iter().filter_map(Bvh::root_aabb).collect();
                 let objects: Vec<&[usize]> = parts.iter().map(|part| &part[..]).collect();
                 let whole = joined(&config.build(&roots).unwrap(), &trees, &objects);
