@@ -206,19 +206,18 @@ fn seen(
     };
     let sides: &[f64] = if args.two_sided { &[1.0, -1.0] } else { &[1.0] };
     let progress = Progress::new((points.at.len() * sides.len()) as u64, "points");
-    let mut values = Vec::new();
-    for &side in sides {
+    let from_side = |&side: &f64| {
         let at = points.above(side * offset);
-        let normals: Option<Vec<Vec3>> = normals
-            .as_ref()
-            .map(|normals| normals.iter().map(|normal| normal * side as f32).collect());
+        let turned =
+            |normals: &Vec<Vec3>| normals.iter().map(|normal| normal * side as f32).collect();
+        let normals: Option<Vec<Vec3>> = normals.as_ref().map(turned);
         let view = View { points: &at, normals: normals.as_deref() };
-        let seen = seen_from(&looks.sky, wide, view, looks.by_cosine, &|count| progress.add(count));
-        values = match values.is_empty() {
-            true => seen,
-            false => values.iter().zip(seen).map(|(one, other)| one.max(other)).collect(),
-        };
-    }
+        seen_from(&looks.sky, wide, view, looks.by_cosine, &|count| progress.add(count))
+    };
+    let larger = |one: Vec<f64>, other: Vec<f64>| {
+        one.iter().zip(other).map(|(one, other)| one.max(other)).collect()
+    };
+    let values = sides.iter().map(from_side).reduce(larger).unwrap_or_default();
     progress.end();
     values
 }

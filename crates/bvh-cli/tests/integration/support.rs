@@ -1,20 +1,16 @@
 //! The program `bvh` as a child process, by its command lines.
 #![allow(dead_code, unused_imports)] // each test file uses some of it
 
-#[path = "../../../bvh-scenes/tests/integration/glb.rs"]
-mod glb;
 #[path = "../program/mod.rs"]
 mod program;
 
 use glam::DVec3;
-pub use glb::glb;
 pub use program::*;
 use serde_json::{Map, Value};
 use std::path::Path;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_bvh");
 
-/// Splits a command line at its spaces.
 pub fn words(line: &str) -> Vec<&str> {
     line.split_whitespace().collect()
 }
