@@ -40,7 +40,6 @@ pub fn scene_of(tree: &Path, name: &str) -> Result<Scene, Error> {
     Ok(load_scene(name, precision)?)
 }
 
-/// Returns the precision of the triangles of a tree file.
 pub fn precision_of(tree: &Path) -> Result<Precision, Error> {
     let is_double = tree_file::header(tree)?.is_double;
     Ok(if is_double { Precision::Double } else { Precision::Single })
@@ -92,7 +91,6 @@ pub fn output_or_free(
     Ok(path)
 }
 
-/// Checks the path of a file to read.
 pub fn input_file(flag: &str, path: &Path) -> Result<(), Error> {
     regular(path).map(drop).map_err(|error| Error::Usage(format!("{flag}: {error}")))
 }

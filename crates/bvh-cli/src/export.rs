@@ -43,7 +43,6 @@ const MEASURED: [(&str, [f64; 2]); 5] = [
     ("madmann91-bvh", [1.04, 1.47]),
 ];
 
-/// Parses the names of the targets.
 pub fn tracers() -> impl TypedValueParser<Value = Target> {
     named(Target::ALL.map(|target| (target.name, target)))
 }

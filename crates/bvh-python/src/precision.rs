@@ -24,7 +24,6 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Reads the argument `precision`.
     pub fn read(precision: &str) -> PyResult<Self> {
         named("precision", precision, [("single", Self::Single), ("double", Self::Double)])
     }

@@ -8,25 +8,20 @@ use pyo3::prelude::*;
 
 const ALL_BITS: &str = "0 to 18446744073709551615";
 
-/// The accepted times.
 pub const SECONDS: &str = "0 to 1e19";
 
-/// Reads the argument `seconds`.
 pub fn seconds(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
     optional("seconds", argument, SECONDS)
 }
 
-/// Reads the argument `references`.
 pub fn references(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
     optional("references", argument, "1 to 16")
 }
 
-/// Reads the argument `seed`.
 pub fn seed(argument: &Bound<PyAny>) -> PyResult<u64> {
     number("seed", argument, ALL_BITS)
 }
 
-/// Reads the argument `work`.
 pub fn work(argument: &Bound<PyAny>) -> PyResult<Option<u64>> {
     optional("work", argument, ALL_BITS)
 }

@@ -156,7 +156,6 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     Ok(())
 }
 
-/// Lists the steps that the scene does not need and that are skipped, one line each.
 fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), Error> {
     let skipped = shortcuts::of(&scene.boxes).map_err(Error::search(&scene.name, "--explain"))?;
     let size = Aabb::union_of(&scene.boxes).extent().as_vec3();
@@ -168,7 +167,6 @@ fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes the file of the tree, and describes it.
 fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> Result<(), Error> {
     if is_interrupted() && found.is_behind(out) {
         return Err(Error::Interrupted(format!(
@@ -271,7 +269,6 @@ fn summarise(found: &Found, answer: &mut Answer) {
     answer.record("seconds", *seconds);
 }
 
-/// Names the commands that people want next.
 fn next(args: &BakeArgs, found: &Found, out: &Path, answer: &Answer) {
     let (out, scene) = (out.display(), &args.scene);
     let tracer = args.tracer.map_or("TRACER", |target| target.name);

@@ -207,7 +207,6 @@ fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
     whole
 }
 
-/// Writes the tree over a part of a scene.
 fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Error> {
     found.save(path, Reserved::new(path, 0, false)?)?;
     let cost = found.baked.outcome.cost;

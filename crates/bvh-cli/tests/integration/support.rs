@@ -44,12 +44,10 @@ pub fn facts(at: &Path, line: &str) -> Map<String, Value> {
     serde_json::from_str(&bvh(at, &format!("{line} --json"))).unwrap()
 }
 
-/// Returns a result of a command that is a number.
 pub fn number(at: &Path, line: &str, name: &str) -> f64 {
     facts(at, line)[name].as_f64().unwrap()
 }
 
-/// Returns the internal area of the tree in a file.
 pub fn cost(at: &Path, file: &str) -> f64 {
     number(at, &format!("inspect {file}"), "area")
 }
