@@ -111,29 +111,15 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         })
     }
 
-    pub fn contains(
+    /// Returns one answer per point; `answer` writes those of some points.
+    pub fn of_points<T: numpy::Element + Clone + Default>(
         self,
-        solid: &Solid,
         points: &[Point<N>],
-        rule: InsideRule,
-    ) -> PyResult<Column<'py, bool>> {
+        answer: impl Fn(&N::Layout, &[Point<N>], &mut [T]) + Sync,
+    ) -> PyResult<Column<'py, T>> {
         let layout = self.layout;
-        self.columns(points.len(), FEW, |part, inside| {
-            solid.contains(layout, &points[part * FEW..][..inside.len()], rule, inside);
-            Ok(())
-        })
-    }
-
-    pub fn signed_distances(
-        self,
-        solid: &Solid,
-        points: &[Point<N>],
-        rule: InsideRule,
-    ) -> PyResult<Column<'py, f64>> {
-        let layout = self.layout;
-        self.columns(points.len(), FEW, |part, distances| {
-            let points = &points[part * FEW..][..distances.len()];
-            solid.signed_distances(layout, points, rule, distances);
+        self.columns(points.len(), FEW, |part, answers| {
+            answer(layout, &points[part * FEW..][..answers.len()], answers);
             Ok(())
         })
     }

@@ -217,7 +217,9 @@ impl Tracer {
     ) -> PyResult<Column<'py, bool>> {
         let (rule, solid) = (rule(by)?, self.solid(points.py())?);
         call!(self, points.py(), progress, call, N => {
-            call.contains(solid, &self::points::<N>(points)?, rule)
+            call.of_points(&self::points::<N>(points)?, |layout, points, inside| {
+                solid.contains(layout, points, rule, inside);
+            })
         })
     }
 
@@ -251,7 +253,9 @@ impl Tracer {
     ) -> PyResult<Column<'py, f64>> {
         let (rule, solid) = (rule(by)?, self.solid(points.py())?);
         call!(self, points.py(), progress, call, N => {
-            call.signed_distances(solid, &self::points::<N>(points)?, rule)
+            call.of_points(&self::points::<N>(points)?, |layout, points, distances| {
+                solid.signed_distances(layout, points, rule, distances);
+            })
         })
     }
 
