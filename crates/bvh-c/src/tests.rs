@@ -244,23 +244,16 @@ struct Particle {
 }
 
 #[test]
-fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_excluded_ids() {
+fn batches_in_f64_have_strides_sides_and_excluded_ids_of_each_ray() {
     const FAR: f64 = 5_412_345.678;
     let numbers: Vec<f64> = corners(40).into_iter().map(|x| f64::from(x) / 3.0 + FAR).collect();
     let (points, _) = numbers.as_chunks::<3>();
     let (corners, _) = points.as_chunks::<3>();
     let triangles: Vec<DTriangle> = corners.iter().map(|&corners| corners.into()).collect();
-    let vertices: Vec<f64> =
+    let mut vertices: Vec<f64> =
         numbers.chunks(3).flat_map(|xyz| [xyz, &[f64::NAN]].concat()).collect();
-    let ids: Vec<u32> = (0..120).collect();
-    let objects = BvsObjects {
-        count: 40,
-        vertices_f64: vertices.as_ptr(),
-        vertex_count: 120,
-        vertex_stride: 32,
-        indices: ids.as_ptr(),
-        ..BvsObjects::NONE
-    };
+    let vertices_f64 = vertices.as_mut_ptr();
+    let objects = BvsObjects { count: 40, vertices_f64, vertex_stride: 32, ..BvsObjects::NONE };
     let missing = BvsHitF64 { t: 0.0, object: 7 };
     let mut particles: Vec<Particle> = (0..1500u16)
         .map(|i| {
@@ -271,25 +264,19 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         })
         .collect();
     let excluded: Vec<u32> = (0..1500u32).flat_map(|i| [i / 38, u32::MAX]).collect();
-    let folder = tempfile::tempdir().unwrap();
-    let path = CString::new(folder.path().join("c.bvh").to_str().unwrap()).unwrap();
     // SAFETY: every array has the promised length, and everything is freed once.
     unsafe {
         let tree = bvs_tree_bake(&BvsBake { objects, work: 3000, frame: 1, ..NO_BAKE });
-        ok(bvs_tree_save(tree, path.as_ptr()));
-        ok(bvs_tree_update(tree, &objects));
         let single = BvsObjects { count: 40, ..BvsObjects::NONE };
         let accepted = "objects are 40 triangles; accepted: 40 triangles in f64";
         invalid(bvs_tree_update(tree, &single), accepted);
-        let loaded = bvs_tree_load(path.as_ptr(), &objects);
-        assert_eq!((*loaded).owned.tree(), (*tree).owned.tree());
-        let wide = DWideBvh::new((*loaded).owned.tree(), &triangles).unwrap();
-        rejected(bvs_tracer_new(loaded).is_null(), "tree is over triangles in f64");
-        let tracer = bvs_tracer_f64_new(loaded);
+        rejected(bvs_tracer_new(tree).is_null(), "tree is over triangles in f64");
+        let wide = DWideBvh::new((*tree).owned.tree(), &triangles).unwrap();
+        let tracer = bvs_tracer_f64_new(tree);
         bvs_tree_free(tree);
-        bvs_tree_free(loaded);
-        for (orientation, excluded_count) in [(0, 0), (1, 2), (2, 2), (0, 2)] {
-            let side = [Orientation::Any, Orientation::Exiting, Orientation::Entering];
+        let sides = [Orientation::Any, Orientation::Exiting, Orientation::Entering];
+        for (side, excluded_count) in [(0, 0), (1, 2), (2, 2), (0, 2)] {
+            let orientation = side as u32;
             let select = BvsSelect { orientation, excluded_count, excluded: excluded.as_ptr() };
             let select = if orientation + excluded_count == 0 { null() } else { &raw const select };
             let (first, count) = (particles.as_mut_ptr(), particles.len());
@@ -302,31 +289,14 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
             let mut found = 0;
             for (number, Particle { energy, ray, hit, material }) in particles.iter().enumerate() {
                 let exclude = &excluded[2 * number..][..excluded_count as usize];
-                let expected = wide.nearest_hit(
-                    &DRay::new(ray.origin, ray.direction, ray.t_min, ray.t_max).unwrap(),
-                    Select { orientation: side[orientation as usize], exclude },
-                );
+                let ray = DRay::new(ray.origin, ray.direction, ray.t_min, ray.t_max).unwrap();
+                let expected = wide.nearest_hit(&ray, Select { orientation: sides[side], exclude });
                 assert_eq!((*hit, *energy, *material), (expected.into(), 1.0, 5));
-                let is_hit = u8::from(expected.is_some());
-                assert_eq!(any[2 * number..][..2], [is_hit, 9]);
-                let alone = BvsSelect { orientation, excluded_count, excluded: exclude.as_ptr() };
-                let mut single = (missing, 9);
-                ok(bvs_nearest_f64(tracer, ray, &alone, &mut single.0));
-                ok(bvs_any_f64(tracer, ray, &alone, &mut single.1));
-                assert_eq!(single, (expected.into(), is_hit));
-                found += usize::from(is_hit);
+                assert_eq!(any[2 * number..][..2], [u8::from(expected.is_some()), 9]);
+                found += usize::from(expected.is_some());
             }
             assert!((200..1400).contains(&found), "{found}");
         }
-        let points = [particles[3].ray.origin, [f64::MAX; 3]];
-        let mut closest = [BvsClosest { object: 7, ..None.into() }; 2];
-        let first = closest.as_mut_ptr();
-        ok(bvs_tracer_closest_points_f64(tracer, points.as_ptr().cast(), 2, first));
-        assert_eq!(closest[0], wide.closest_point(points[0]).into());
-        let mut inside = [9; 2];
-        ok(bvs_tracer_contains_f64(tracer, points.as_ptr().cast(), 2, inside.as_mut_ptr()));
-        assert_eq!(inside, [0; 2]);
-        assert_eq!((closest[1].distance, closest[1].object), (f64::INFINITY, u32::MAX));
         let ray = particles[0].ray;
         let mut hit = missing;
         let wrong = BvsSelect { orientation: 3, excluded_count: 0, excluded: null() };
@@ -349,16 +319,9 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         invalid(status, "points[0] is [0, 1000");
         bvs_tracer_f64_free(tracer);
         bvs_tracer_f64_free(null_mut());
-        let mut other = vertices.clone();
-        other[4 * 5 + 1] = -1e37;
-        let objects = BvsObjects { vertices_f64: other.as_ptr(), ..objects };
+        *vertices_f64.add(4 * 5 + 1) = -1e37;
         let refused = bvs_tree_bake(&BvsBake { objects, ..NO_BAKE });
         rejected(refused.is_null(), "vertex 5 of triangle 1 is [");
-        // What rounding leaves of 0 is 0.
-        other[4 * 5 + 1] = 2.4e-47;
-        let tree = bvs_tree_bake(&BvsBake { objects, ..NO_BAKE });
-        assert_eq!((*tree).owned.doubles().unwrap()[1].0[2].y, 0.0);
-        bvs_tree_free(tree);
         let single = self::tree(&[0.0; 9]);
         rejected(bvs_tracer_f64_new(single).is_null(), "vertices_f64");
         bvs_tree_free(single);
@@ -630,13 +593,9 @@ fn a_budget_of_work_and_none_at_all_give_the_file_of_the_rust_crates() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("c.bvh");
     let name = CString::new(path.to_str().unwrap()).unwrap();
-    for (references, work, rays) in [
-        (1.0, 50_000, &[][..]),
-        (1.5, 50_000, &[]),
-        (1.0, 50_000, &segments),
-        (1.5, 50_000, &segments),
-        (0.0, 0, &[]),
-    ] {
+    for (references, work, rays) in
+        [(1.5, 50_000, &[][..]), (1.0, 50_000, &segments), (0.0, 0, &[])]
+    {
         let bake = BvsBake {
             objects: soup(&corners),
             rays: floats.as_ptr().cast(),

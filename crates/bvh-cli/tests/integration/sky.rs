@@ -26,13 +26,11 @@ fn the_view_of_the_sky_from_a_street_is_that_of_its_formula_for_points_of_every_
     let wall = |x: f64| rectangle([x, -1e4, 0.0], [x, 1e4, 0.0], [x, 1e4, 1.0]);
     fs::write(at.join("street.obj"), obj([wall(-1.0), wall(1.0)].concat())).unwrap();
     let xs = [-0.9, -0.5, 0.0, 0.7f32];
-    let points: Vec<[f32; 3]> = xs.iter().map(|&x| [x, 0.0, 0.0]).collect();
-    let line = |[x, y, z]: &[f32; 3]| format!("{x},{y},{z}");
-    let lines: Vec<String> = points.iter().map(line).collect();
+    let lines = xs.map(|x| format!("{x},0,0"));
     fs::write(at.join("p.csv"), format!("x,y,z\n{}\n", lines.join("\n"))).unwrap();
-    let bytes = points.as_flattened().iter().map(|x| x.to_le_bytes()).collect::<Vec<_>>().concat();
     let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 3), }\n";
     let length = (header.len() as u16).to_le_bytes();
+    let bytes = xs.map(|x| [x, 0.0, 0.0].map(f32::to_le_bytes)).concat().concat();
     let npy = [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), &bytes].concat();
     fs::write(at.join("p.npy"), npy).unwrap();
     // Columns between semicolons, and normals.
