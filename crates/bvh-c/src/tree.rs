@@ -89,12 +89,9 @@ pub unsafe extern "C" fn bvs_tree_from_triangles(
         let triangles = BvsObjects { count, vertices, ..BvsObjects::NONE };
         // SAFETY: `vertices` points to 9 floats for each of `count` triangles.
         let triangles = unsafe { objects_of(&triangles) }?;
-        let frame = Frames::File;
-        found(
-            triangles,
-            &Options { references: Some(references), frame, ..Options::default() },
-            Some(seconds),
-        )
+        let references = Some(references);
+        let options = Options { references, frame: Frames::File, ..Options::default() };
+        found(triangles, &options, Some(seconds))
     })
 }
 

@@ -75,13 +75,8 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
             continue;
         }
         let scene = part.scene(&scene);
-        let found = part.plan.search(
-            &scene,
-            None,
-            &Open::default(),
-            Watch::new(part.plan.effort),
-            answer,
-        )?;
+        let watch = Watch::new(part.plan.effort);
+        let found = part.plan.search(&scene, None, &Open::default(), watch, answer)?;
         // A part whose search was cut short would differ from run to run.
         if is_interrupted() {
             let folder = folder.display();
