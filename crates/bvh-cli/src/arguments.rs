@@ -10,11 +10,12 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 
 /// Parses the name of one of these values.
-pub fn named<T: Clone + Send + Sync + 'static, const N: usize>(
-    values: [(&'static str, T); N],
+pub fn named<T: Clone + Send + Sync + 'static>(
+    values: impl IntoIterator<Item = (&'static str, T)>,
 ) -> impl TypedValueParser<Value = T> {
-    let names = values.each_ref().map(|(name, _)| *name);
-    PossibleValuesParser::new(names).try_map(move |found| {
+    let values: Vec<(&str, T)> = values.into_iter().collect();
+    let names = PossibleValuesParser::new(values.iter().map(|(name, _)| *name));
+    names.try_map(move |found| {
         let value = values.iter().find(|(name, _)| *name == found);
         value.map(|(_, value)| value.clone()).ok_or("unknown")
     })

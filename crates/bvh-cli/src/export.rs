@@ -7,7 +7,6 @@ use bvh_core::cost::Objective;
 use bvh_core::export::{ExportError, Layout, Target};
 use bvh_scenes::{files, tree_file};
 use clap::Args;
-use clap::builder::TypedValueParser;
 use std::path::PathBuf;
 
 /// Write a tree for the tracer of another library: with the leaves that cost least there, no deeper
@@ -21,7 +20,8 @@ pub struct ExportArgs {
     /// The tree's scene, by name or path of a mesh file.
     pub scene: String,
     /// The tracer.
-    #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
+    #[arg(long = "for", value_name = "TRACER")]
+    #[arg(value_parser = named(Target::ALL.map(|target| (target.name, target))))]
     pub tracer: Target,
     /// The file to write, replaced when it is complete; `.json` for json.
     #[arg(short, long, value_name = "FILE.bin|.json")]
@@ -42,10 +42,6 @@ const MEASURED: [(&str, [f64; 2]); 5] = [
     ("bvh", [1.02, 1.95]),
     ("madmann91-bvh", [1.04, 1.47]),
 ];
-
-pub fn tracers() -> impl TypedValueParser<Value = Target> {
-    named(Target::ALL.map(|target| (target.name, target)))
-}
 
 /// Writes the better of the tree and a greedy one for the tracer, and prints how they compare.
 pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {

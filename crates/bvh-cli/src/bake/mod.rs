@@ -8,7 +8,6 @@ mod watch;
 use crate::Error;
 use crate::answer::{Answer, frame_facts, gain, saved, whole};
 use crate::arguments::{input_file, load_scene, named, output_file, output_or_free, precision_of};
-use crate::export::tracers;
 use crate::interrupt::{hold, is_interrupted};
 use crate::rays::Rays;
 use bvh_core::Aabb;
@@ -20,7 +19,6 @@ use bvh_search::{
     Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
 };
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use effort::Effort;
 use plan::{Found, Plan, Start, is_turned};
 use std::path::{Path, PathBuf};
@@ -80,11 +78,12 @@ pub struct BakeArgs {
     pub precision: Option<Precision>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
     /// and with as many references as pay there.
-    #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
-    #[arg(conflicts_with_all = ["rays", "parts"])]
+    #[arg(long = "for", value_name = "TRACER", conflicts_with_all = ["rays", "parts"])]
+    #[arg(value_parser = named(Target::ALL.map(|target| (target.name, target))))]
     pub tracer: Option<Target>,
     /// The method, with its default parameters.
-    #[arg(long, value_name = "NAME", default_value = BEST, value_parser = methods())]
+    #[arg(long, value_name = "NAME", default_value = BEST)]
+    #[arg(value_parser = named(Method::all().into_iter().map(|method| (method.name(), method))))]
     pub method: Method,
     /// Continue from the tree of an earlier bake of the same scene; the result is never worse.
     #[arg(long, value_name = "FILE.bvh")]
@@ -110,13 +109,6 @@ const ADVANCED: &str = "Advanced";
 
 /// The method that can continue from a given tree and divide objects.
 const BEST: &str = "best";
-
-fn methods() -> impl TypedValueParser<Value = Method> {
-    PossibleValuesParser::new(Method::NAMES).try_map(|name| {
-        let named = Method::all().into_iter().find(|method| method.name() == name);
-        named.ok_or("expected one of the methods")
-    })
-}
 
 /// Searches until the budget is spent or the user interrupts, writes the best tree, and prints its
 /// cost. An interrupted bake writes the file as well, unless the file has a better tree of the scene,
