@@ -146,12 +146,11 @@ pub unsafe extern "C" fn bvs_nearest_f64(
     hit: *mut BvsHitF64,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
-        let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `ray` points to a ray that nobody changes during the call.
-        let ray = unsafe { given("ray", ray) }?.ray().map_err(Failure::invalid)?;
-        // SAFETY: `select` is null or what counts for a ray.
-        let select = unsafe { selected(select, 1) }?;
+        // SAFETY: the caller keeps all three alive during the call, and nobody changes them; `select`
+        // is null or what counts for a ray.
+        let (tracer, ray, select) =
+            unsafe { (given("tracer", tracer)?, given("ray", ray)?, selected(select, 1)?) };
+        let ray = ray.ray().map_err(Failure::invalid)?;
         // SAFETY: `hit` points to a hit that nobody else uses during the call.
         *unsafe { given_mut("hit", hit) }? = tracer.wide.nearest_hit(&ray, select).into();
         Ok(())
@@ -171,12 +170,11 @@ pub unsafe extern "C" fn bvs_any_f64(
     hit: *mut u8,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
-        let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `ray` points to a ray that nobody changes during the call.
-        let ray = unsafe { given("ray", ray) }?.ray().map_err(Failure::invalid)?;
-        // SAFETY: `select` is null or what counts for a ray.
-        let select = unsafe { selected(select, 1) }?;
+        // SAFETY: the caller keeps all three alive during the call, and nobody changes them; `select`
+        // is null or what counts for a ray.
+        let (tracer, ray, select) =
+            unsafe { (given("tracer", tracer)?, given("ray", ray)?, selected(select, 1)?) };
+        let ray = ray.ray().map_err(Failure::invalid)?;
         // SAFETY: `hit` points to a byte that nobody else uses during the call.
         *unsafe { given_mut("hit", hit) }? = u8::from(tracer.wide.any_hit(&ray, select));
         Ok(())

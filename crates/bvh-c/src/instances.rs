@@ -107,10 +107,8 @@ pub unsafe extern "C" fn bvs_instances_nearest_hits(
     hits: *mut BvsInstanceHit,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the scene alive and unchanged during the call.
-        let scene = &unsafe { given("scene", scene) }?.scene;
-        // SAFETY: `rays` points to `count` elements that nobody changes during the call.
-        let rays = unsafe { slice("rays", rays, count) }?;
+        // SAFETY: the caller keeps the scene and `count` rays during the call; nobody changes them.
+        let (scene, rays) = unsafe { (&given("scene", scene)?.scene, slice("rays", rays, count)?) };
         // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
         let hits = unsafe { slice_mut("hits", hits.cast::<InstanceHit>(), count) }?;
         in_batches(rays, |start, rays| {
@@ -130,10 +128,8 @@ pub unsafe extern "C" fn bvs_instances_any_hits(
     hits: *mut u8,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the scene alive and unchanged during the call.
-        let scene = &unsafe { given("scene", scene) }?.scene;
-        // SAFETY: `rays` points to `count` elements that nobody changes during the call.
-        let rays = unsafe { slice("rays", rays, count) }?;
+        // SAFETY: the caller keeps the scene and `count` rays during the call; nobody changes them.
+        let (scene, rays) = unsafe { (&given("scene", scene)?.scene, slice("rays", rays, count)?) };
         // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
         let hits = unsafe { slice_mut("hits", hits, count) }?;
         flags_in_batches(rays, hits, |rays, hits| scene.any_hits(rays, hits))

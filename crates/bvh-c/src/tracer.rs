@@ -158,10 +158,8 @@ pub unsafe extern "C" fn bvs_nearest(
     hit: *mut BvsHit,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
-        let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `ray` points to a ray that nobody changes during the call.
-        let ray = unsafe { given("ray", ray) }?;
+        // SAFETY: the caller keeps the tracer and the ray during the call; nobody changes them.
+        let (tracer, ray) = unsafe { (given("tracer", tracer)?, given("ray", ray)?) };
         ray.check().map_err(Failure::invalid)?;
         // SAFETY: `hit` points to a hit that nobody else uses during the call.
         let hit = unsafe { given_mut("hit", hit) }?;
@@ -182,10 +180,8 @@ pub unsafe extern "C" fn bvs_any(
     hit: *mut u8,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
-        let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `ray` points to a ray that nobody changes during the call.
-        let ray = unsafe { given("ray", ray) }?;
+        // SAFETY: the caller keeps the tracer and the ray during the call; nobody changes them.
+        let (tracer, ray) = unsafe { (given("tracer", tracer)?, given("ray", ray)?) };
         ray.check().map_err(Failure::invalid)?;
         // SAFETY: `hit` points to a byte that nobody else uses during the call.
         *unsafe { given_mut("hit", hit) }? = u8::from(tracer.wide.any_hit(&ray.checked()));
@@ -207,10 +203,8 @@ pub unsafe extern "C" fn bvs_tracer_nearest_hits(
     hits: *mut BvsHit,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
-        let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `rays` points to `count` elements that nobody changes during the call.
-        let rays = unsafe { slice("rays", rays, count) }?;
+        // SAFETY: the caller keeps the tracer and `count` rays during the call; nobody changes them.
+        let (tracer, rays) = unsafe { (given("tracer", tracer)?, slice("rays", rays, count)?) };
         // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
         let hits = unsafe { slice_mut("hits", hits.cast::<Hit>(), count) }?;
         in_batches(rays, |start, rays| {
@@ -233,10 +227,8 @@ pub unsafe extern "C" fn bvs_tracer_any_hits(
     hits: *mut u8,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
-        let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `rays` points to `count` elements that nobody changes during the call.
-        let rays = unsafe { slice("rays", rays, count) }?;
+        // SAFETY: the caller keeps the tracer and `count` rays during the call; nobody changes them.
+        let (tracer, rays) = unsafe { (given("tracer", tracer)?, slice("rays", rays, count)?) };
         // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
         let hits = unsafe { slice_mut("hits", hits, count) }?;
         flags_in_batches(rays, hits, |rays, hits| {
@@ -258,10 +250,8 @@ pub unsafe extern "C" fn bvs_tracer_surface_hits(
     hits: *mut BvsSurfaceHit,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
-        let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `rays` points to `count` elements that nobody changes during the call.
-        let rays = unsafe { slice("rays", rays, count) }?;
+        // SAFETY: the caller keeps the tracer and `count` rays during the call; nobody changes them.
+        let (tracer, rays) = unsafe { (given("tracer", tracer)?, slice("rays", rays, count)?) };
         // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
         let hits = unsafe { slice_mut("hits", hits, count) }?;
         let mut found = vec![Hit::MISS; count.min(BATCH)];
@@ -304,10 +294,8 @@ pub unsafe extern "C" fn bvs_tracer_all_hits(
     total: *mut usize,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
-        let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `rays` points to `count` elements that nobody changes during the call.
-        let rays = unsafe { slice("rays", rays, count) }?;
+        // SAFETY: the caller keeps the tracer and `count` rays during the call; nobody changes them.
+        let (tracer, rays) = unsafe { (given("tracer", tracer)?, slice("rays", rays, count)?) };
         // SAFETY: `hits` points to `capacity` elements that nobody else uses during the call.
         let hits = unsafe { slice_mut("hits", hits.cast::<Hit>(), capacity) }?;
         // SAFETY: `counts` points to `count` elements that nobody else uses during the call.

@@ -89,12 +89,9 @@ pub unsafe extern "C" fn bvs_tree_from_triangles(
         let triangles = BvsObjects { count, vertices, ..BvsObjects::NONE };
         // SAFETY: `vertices` points to 9 floats for each of `count` triangles.
         let triangles = unsafe { objects_of(&triangles) }?;
-        let frame = Frames::File;
-        found(
-            triangles,
-            &Options { references: Some(references), frame, ..Options::default() },
-            Some(seconds),
-        )
+        let references = Some(references);
+        let options = Options { references, frame: Frames::File, ..Options::default() };
+        found(triangles, &options, Some(seconds))
     })
 }
 
@@ -304,10 +301,8 @@ pub unsafe extern "C" fn bvs_tree_cost(
         let Some((_, objective)) = found else {
             return Err(Failure::invalid(format!("kind is {kind}; accepted: 0 to 3")));
         };
-        // SAFETY: nobody changes the tree during the call.
-        let tree = unsafe { given("tree", tree) }?;
-        // SAFETY: `cost` points to a double that nobody else uses during the call.
-        let cost = unsafe { given_mut("cost", cost) }?;
+        // SAFETY: nobody changes the tree during the call, or uses `cost`, which points to a double.
+        let (tree, cost) = unsafe { (given("tree", tree)?, given_mut("cost", cost)?) };
         *cost = tree.owned.cost(*objective);
         Ok(())
     })
@@ -341,10 +336,8 @@ pub unsafe extern "C" fn bvs_tree_frame(tree: *const BvsTree, frame: *mut f64) -
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvs_tree_nodes(tree: *const BvsTree, count: *mut usize) -> *const BvsNode {
     array(|| {
-        // SAFETY: nobody changes the tree during the call.
-        let tree = unsafe { given("tree", tree) }?;
-        // SAFETY: `count` points to a size that nobody else uses during the call.
-        let count = unsafe { given_mut("count", count) }?;
+        // SAFETY: nobody changes the tree during the call, or uses `count`, which points to a size.
+        let (tree, count) = unsafe { (given("tree", tree)?, given_mut("count", count)?) };
         *count = tree.nodes.len();
         Ok(tree.nodes.as_ptr().cast())
     })
@@ -360,10 +353,8 @@ pub unsafe extern "C" fn bvs_tree_object_ids(
     count: *mut usize,
 ) -> *const u32 {
     array(|| {
-        // SAFETY: nobody changes the tree during the call.
-        let tree = unsafe { given("tree", tree) }?;
-        // SAFETY: `count` points to a size that nobody else uses during the call.
-        let count = unsafe { given_mut("count", count) }?;
+        // SAFETY: nobody changes the tree during the call, or uses `count`, which points to a size.
+        let (tree, count) = unsafe { (given("tree", tree)?, given_mut("count", count)?) };
         let ids = &tree.owned.tree().prim_ids;
         *count = ids.len();
         Ok(ids.as_ptr())
@@ -414,10 +405,8 @@ pub unsafe extern "C" fn bvs_tree_from_bytes(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvs_tree_to_bytes(tree: *const BvsTree, size: *mut usize) -> *mut u8 {
     try_made(|| {
-        // SAFETY: nobody changes the tree during the call.
-        let tree = unsafe { given("tree", tree) }?;
-        // SAFETY: `size` points to a size that nobody else uses during the call.
-        let size = unsafe { given_mut("size", size) }?;
+        // SAFETY: nobody changes the tree during the call, or uses `size`, which points to a size.
+        let (tree, size) = unsafe { (given("tree", tree)?, given_mut("size", size)?) };
         let bytes = tree.owned.save().map_err(Failure::invalid)?.into_boxed_slice();
         *size = bytes.len();
         Ok(Box::into_raw(bytes).cast())
@@ -442,10 +431,8 @@ pub unsafe extern "C" fn bvs_bytes_free(bytes: *mut u8, size: usize) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvs_tree_save(tree: *const BvsTree, path: *const c_char) -> BvsStatus {
     status(|| {
-        // SAFETY: nobody changes the tree during the call.
-        let tree = unsafe { given("tree", tree) }?;
-        // SAFETY: `path` is null or ends with a zero.
-        let path = unsafe { text("path", path) }?;
+        // SAFETY: nobody changes the tree during the call; `path` is null or ends with a zero.
+        let (tree, path) = unsafe { (given("tree", tree)?, text("path", path)?) };
         let bytes = tree.owned.save().map_err(Failure::invalid)?;
         Ok(bvh_scenes::files::write(path.as_ref(), &bytes)?)
     })
@@ -465,10 +452,9 @@ pub unsafe extern "C" fn bvs_tree_export(
     path: *const c_char,
 ) -> BvsStatus {
     status(|| {
-        // SAFETY: nobody changes the tree during the call.
-        let tree = unsafe { given("tree", tree) }?;
-        // SAFETY: both are null or end with a zero.
-        let [tracer, path] = unsafe { [text("tracer", tracer)?, text("path", path)?] };
+        // SAFETY: nobody changes the tree during the call; both strings are null or end with a zero.
+        let (tree, tracer, path) =
+            unsafe { (given("tree", tree)?, text("tracer", tracer)?, text("path", path)?) };
         let target = Target::named(tracer)
             .map_err(|unknown| Failure::invalid(format!("tracer is {unknown}")))?;
         if divided > 1 {
@@ -559,12 +545,6 @@ unsafe fn objects_of(objects: &BvsObjects) -> Result<Objects, Failure> {
     if !boxes.is_null() {
         // SAFETY: an `Aabb` is `repr(C)` with 6 floats, and `boxes` points to that many for each.
         let boxes = unsafe { slice("boxes", boxes.cast::<Aabb>(), count) }?;
-        for (index, aabb @ Aabb { min, max }) in boxes.iter().enumerate() {
-            aabb.check().map_err(|reason| {
-                let accepted = "accepted: finite numbers, the lower corner first";
-                Failure::invalid(format!("box {index}, {min} to {max}, {reason}; {accepted}"))
-            })?;
-        }
         return Ok(Objects::Boxes(boxes.to_vec()));
     }
     Ok(Objects::Shapes(if vertices_f64.is_null() {

@@ -5,7 +5,6 @@ use bvh_core::Frame;
 use indicatif::HumanCount;
 use serde_json::{Map, Value, json};
 
-/// The results of one command.
 pub struct Answer {
     facts: Option<Map<String, Value>>,
 }

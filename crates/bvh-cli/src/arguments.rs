@@ -6,7 +6,20 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Bvh, DWideBvh};
 use bvh_scenes::files::{folder_of, regular};
 use bvh_scenes::{Precision, Scene, SceneError, tree_file};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
+
+/// Parses the name of one of these values.
+pub fn named<T: Clone + Send + Sync + 'static>(
+    values: impl IntoIterator<Item = (&'static str, T)>,
+) -> impl TypedValueParser<Value = T> {
+    let values: Vec<(&str, T)> = values.into_iter().collect();
+    let names = PossibleValuesParser::new(values.iter().map(|(name, _)| *name));
+    names.try_map(move |found| {
+        let value = values.iter().find(|(name, _)| *name == found);
+        value.map(|(_, value)| value.clone()).ok_or("unknown")
+    })
+}
 
 /// Loads a scene by name or path, and prints the remark on it, if it has one.
 pub fn load_scene(name: &str, precision: Precision) -> Result<Scene, SceneError> {
@@ -28,7 +41,6 @@ pub fn scene_of(tree: &Path, name: &str) -> Result<Scene, Error> {
     Ok(load_scene(name, precision)?)
 }
 
-/// Returns the precision of the triangles of a tree file.
 pub fn precision_of(tree: &Path) -> Result<Precision, Error> {
     let is_double = tree_file::header(tree)?.is_double;
     Ok(if is_double { Precision::Double } else { Precision::Single })
@@ -80,7 +92,6 @@ pub fn output_or_free(
     Ok(path)
 }
 
-/// Checks the path of a file to read.
 pub fn input_file(flag: &str, path: &Path) -> Result<(), Error> {
     regular(path).map(drop).map_err(|error| Error::Usage(format!("{flag}: {error}")))
 }

@@ -161,22 +161,16 @@ fn rays(scene: &Scene, tree: &Bvh) -> Vec<Measured> {
         let direction = camera.direction(x + 0.5, y + 0.5).as_vec3();
         Ray::half_line(camera.origin.as_vec3(), direction).ok()
     };
+    let primary = pixels.filter_map(through).collect();
+    let mut kinds = vec![Measured { kind: Kind::Primary, rays: primary, seconds: Vec::new() }];
     let anywhere = of_anything(COUNT, &scene.primitives, tree, 1, &|| false);
-    let of_kind = |kind| {
-        let of_kind = anywhere.iter().filter(move |traced| traced.kind == kind);
-        of_kind.map(|traced| traced.ray).collect()
-    };
-    [Kind::Primary, Kind::Bounce, Kind::Shadow, Kind::Incoherent]
-        .map(|kind| {
-            let rays: Vec<Ray> = match kind {
-                Kind::Primary => pixels.clone().filter_map(through).collect(),
-                _ => of_kind(kind),
-            };
-            Measured { kind, rays, seconds: Vec::new() }
-        })
-        .into_iter()
-        .filter(|measured| !measured.rays.is_empty())
-        .collect()
+    for kind in [Kind::Bounce, Kind::Shadow, Kind::Incoherent] {
+        let of_kind = anywhere.iter().filter(|traced| traced.kind == kind);
+        let rays = of_kind.map(|traced| traced.ray).collect();
+        kinds.push(Measured { kind, rays, seconds: Vec::new() });
+    }
+    kinds.retain(|measured| !measured.rays.is_empty());
+    kinds
 }
 
 /// Returns the median, and the ends of its 95 % interval, which are values themselves: another

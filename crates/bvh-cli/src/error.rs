@@ -8,27 +8,19 @@ use bvh_search::SearchError;
 
 /// A failure, with its file or object.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each message describes its fields")]
 pub enum Error {
-    /// The scene is neither built in, nor fetched, nor a readable mesh file.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The command line has an invalid value or contradicts itself.
     #[error("{0}")]
     Usage(String),
-    /// An input cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A file or folder cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// A search failed.
     #[error("scene {scene}, method {method}: {source}")]
     Search { scene: String, method: String, source: Box<SearchError> },
-    /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {source}")]
     Tracing { scene: String, source: DensityError },
-    /// A tree file is damaged or belongs to a different scene.
     #[error(transparent)]
     TreeFile(#[from] TreeFileError),
     /// Ctrl-C ended the command, which left this on the disk.

@@ -2,12 +2,11 @@
 
 use crate::Error;
 use crate::answer::{Answer, gain, whole};
-use crate::arguments::{greedy, output_file, scene_of};
+use crate::arguments::{greedy, named, output_file, scene_of};
 use bvh_core::cost::Objective;
 use bvh_core::export::{ExportError, Layout, Target};
 use bvh_scenes::{files, tree_file};
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 
 /// Write a tree for the tracer of another library: with the leaves that cost least there, no deeper
@@ -21,7 +20,8 @@ pub struct ExportArgs {
     /// The tree's scene, by name or path of a mesh file.
     pub scene: String,
     /// The tracer.
-    #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
+    #[arg(long = "for", value_name = "TRACER")]
+    #[arg(value_parser = named(Target::ALL.map(|target| (target.name, target))))]
     pub tracer: Target,
     /// The file to write, replaced when it is complete; `.json` for json.
     #[arg(short, long, value_name = "FILE.bin|.json")]
@@ -42,12 +42,6 @@ const MEASURED: [(&str, [f64; 2]); 5] = [
     ("bvh", [1.02, 1.95]),
     ("madmann91-bvh", [1.04, 1.47]),
 ];
-
-/// Parses the names of the targets.
-pub fn tracers() -> impl TypedValueParser<Value = Target> {
-    PossibleValuesParser::new(Target::ALL.map(|target| target.name))
-        .try_map(|name| Target::named(&name))
-}
 
 /// Writes the better of the tree and a greedy one for the tracer, and prints how they compare.
 pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {

@@ -37,7 +37,6 @@ pub fn succeeded() -> ExitCode {
     if LOST.load(Relaxed) { ExitCode::FAILURE } else { ExitCode::SUCCESS }
 }
 
-/// Prints a line to standard error.
 pub fn print_error(line: &str) {
     // Without standard error there is no place to report the failure.
     let _ = writeln!(std::io::stderr(), "{}", plain(line));
@@ -63,7 +62,6 @@ impl Progress {
         Self { bar: bar(length, &template), unit, lines: Lines::default() }
     }
 
-    /// Counts so many more.
     pub fn add(&self, count: u64) {
         let Self { bar, unit, lines } = self;
         bar.inc(count);
@@ -73,7 +71,6 @@ impl Progress {
         }
     }
 
-    /// Removes the bar.
     pub fn end(&self) {
         self.bar.finish_and_clear();
     }
@@ -105,7 +102,6 @@ pub fn answered(answer: &clap::Error) -> ExitCode {
     succeeded()
 }
 
-/// Writes rows as CSV to a file.
 pub fn write_table<R: Serialize>(
     path: &Path,
     columns: &str,

@@ -160,7 +160,7 @@ fn table(baked: &[Fact], greedy: &[Fact]) -> String {
     let rows = baked.iter().zip(greedy).map(|((name, baked), (_, greedy))| {
         let difference = match *name {
             "Depth" | "Nodes" => String::new(),
-            _ => difference(*baked, *greedy),
+            _ => gain(*baked, *greedy),
         };
         let [baked, greedy] = [*baked, *greedy].map(number);
         format!("<tr><td>{name}</td><td>{baked}</td><td>{greedy}</td><td>{difference}</td></tr>\n")
@@ -169,14 +169,6 @@ fn table(baked: &[Fact], greedy: &[Fact]) -> String {
     format!(
         "<table>\n<tr><th></th><th>baked</th><th>greedy</th><th>difference</th></tr>\n{rows}</table>"
     )
-}
-
-fn difference(baked: f64, greedy: f64) -> String {
-    if greedy <= 0.0 {
-        return String::new();
-    }
-    // A hyphen would be shorter than the plus.
-    format!("{:+.1} %", 100.0 * (baked / greedy - 1.0)).replace('-', "−")
 }
 
 fn number(value: f64) -> String {

@@ -6,7 +6,6 @@ use bvh_scenes::builtin::stand_ins::STAND_INS;
 use bvh_scenes::{FETCHED, SPHERES, Scene, fetched_path};
 use serde_json::json;
 
-/// Prints the table.
 pub fn scenes(answer: &mut Answer) -> Result<(), Error> {
     answer.say(&line("name", "objects", "kind", "description"));
     let mut add = |name: &str, objects: Option<usize>, kind: &str, description: &str| {

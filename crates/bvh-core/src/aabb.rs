@@ -161,19 +161,24 @@ pub enum InvalidBoxReason {
 }
 
 /// The rejected box of an object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the box of object {index} {reason}")]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the box of object {index}, {} to {}, {reason}; accepted: finite numbers, the lower corner first",
+    .found.min, .found.max
+)]
 pub struct InvalidBox {
     /// Index of the object.
     pub index: usize,
+    /// Its box.
+    pub found: Aabb,
     /// The fault of its box.
     pub reason: InvalidBoxReason,
 }
 
 /// Rejects the first box that no object may have. O(n).
 pub fn check_boxes(boxes: &[Aabb]) -> Result<(), InvalidBox> {
-    for (index, aabb) in boxes.iter().enumerate() {
-        aabb.check().map_err(|reason| InvalidBox { index, reason })?;
+    for (index, &found) in boxes.iter().enumerate() {
+        found.check().map_err(|reason| InvalidBox { index, found, reason })?;
     }
     Ok(())
 }
@@ -239,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rejected_box_is_reported_by_its_index() {
+    fn a_rejected_box_is_reported_by_its_index_and_its_numbers() {
         let good = Aabb::from(([0.0; 3], [1.0; 3]));
         for (bad, reason) in [
             (Aabb::from(([0.0, f32::NAN, 0.0], [1.0; 3])), InvalidBoxReason::NotFinite),
@@ -247,7 +252,9 @@ mod tests {
             (Aabb::from(([0.0, 2.0, 0.0], [1.0; 3])), InvalidBoxReason::Inverted),
             (Aabb::EMPTY, InvalidBoxReason::NotFinite),
         ] {
-            assert_eq!(check_boxes(&[good, bad, bad]), Err(InvalidBox { index: 1, reason }));
+            let error = check_boxes(&[good, bad, bad]).unwrap_err();
+            assert_eq!((error.index, error.reason), (1, reason));
+            assert!(error.to_string().contains(&format!("{} to {}", bad.min, bad.max)), "{error}");
         }
     }
 

@@ -32,7 +32,7 @@ pub struct Call<'a, 'py, N: Real> {
 impl<'py, N: Real> Call<'_, 'py, N> {
     pub fn nearest(
         self,
-        source: RaySource,
+        source: &RaySource,
         select: &Selection,
         hint: Hint,
     ) -> PyResult<(Reals<'py>, Column<'py, i32>)> {
@@ -57,7 +57,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
 
     pub fn any(
         self,
-        source: RaySource,
+        source: &RaySource,
         select: &Selection,
         hint: Hint,
     ) -> PyResult<Column<'py, bool>> {
@@ -72,7 +72,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
 
     pub fn all(
         self,
-        source: RaySource,
+        source: &RaySource,
     ) -> PyResult<(Reals<'py>, Column<'py, i32>, Column<'py, i64>)> {
         let Self { py, progress, layout, .. } = self;
         let parts = source.rays.div_ceil(FEW);
@@ -103,7 +103,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         Ok((t.into_pyarray(py).into_any(), objects.into_pyarray(py), numbers.into_pyarray(py)))
     }
 
-    pub fn counts(self, source: RaySource) -> PyResult<Column<'py, u32>> {
+    pub fn counts(self, source: &RaySource) -> PyResult<Column<'py, u32>> {
         let layout = self.layout;
         self.columns(source.rays, FEW, |number, counts| {
             N::all(layout, &source.batch::<N>(number, FEW)?, &mut Vec::new(), counts);
@@ -111,29 +111,15 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         })
     }
 
-    pub fn contains(
+    /// Returns one answer per point; `answer` writes those of some points.
+    pub fn of_points<T: numpy::Element + Clone + Default>(
         self,
-        solid: &Solid,
         points: &[Point<N>],
-        rule: InsideRule,
-    ) -> PyResult<Column<'py, bool>> {
+        answer: impl Fn(&N::Layout, &[Point<N>], &mut [T]) + Sync,
+    ) -> PyResult<Column<'py, T>> {
         let layout = self.layout;
-        self.columns(points.len(), FEW, |part, inside| {
-            solid.contains(layout, &points[part * FEW..][..inside.len()], rule, inside);
-            Ok(())
-        })
-    }
-
-    pub fn signed_distances(
-        self,
-        solid: &Solid,
-        points: &[Point<N>],
-        rule: InsideRule,
-    ) -> PyResult<Column<'py, f64>> {
-        let layout = self.layout;
-        self.columns(points.len(), FEW, |part, distances| {
-            let points = &points[part * FEW..][..distances.len()];
-            solid.signed_distances(layout, points, rule, distances);
+        self.columns(points.len(), FEW, |part, answers| {
+            answer(layout, &points[part * FEW..][..answers.len()], answers);
             Ok(())
         })
     }
@@ -216,7 +202,7 @@ impl<'py, N: Real> Call<'_, 'py, N> {
     /// Answers with the weights and normals of the triangles with these indices, or −1.
     pub fn surfaces(
         self,
-        source: RaySource,
+        source: &RaySource,
         indices: &[i64],
     ) -> PyResult<(Column<'py, f64>, Column<'py, f64>, Reals<'py>)> {
         let Self { py, triangles, .. } = self;

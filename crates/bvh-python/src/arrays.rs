@@ -141,7 +141,6 @@ fn check_elements(
     Ok(())
 }
 
-/// Reads triangles with three corners each.
 pub fn triangles(argument: &Bound<PyAny>, precision: Precision) -> PyResult<Objects> {
     let is_triangles = |shape: &[usize]| matches!(shape, [_, 3, 3]);
     with_precision!(precision, N => {
@@ -161,7 +160,6 @@ pub struct MeshNames {
 /// The arguments of `Tree.from_mesh` and `Tree.update`.
 pub const MESH: MeshNames = MeshNames { vertices: "vertices", faces: "faces" };
 
-/// The faces of a mesh.
 pub struct Faces {
     /// The vertices of each face.
     pub corners: Vec<[u32; 3]>,
@@ -211,7 +209,6 @@ pub fn mesh_objects(
     })
 }
 
-/// Reads the vertices of a mesh with known faces.
 pub fn moved_mesh(
     vertices: &Bound<PyAny>,
     faces: &Faces,
@@ -275,7 +272,6 @@ pub fn segments(argument: Option<&Bound<PyAny>>) -> PyResult<Vec<Segment>> {
     Ok(segments.iter().map(segment).collect())
 }
 
-/// Reads boxes with a lower and an upper corner each.
 pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
     let array = coordinates::<f32>("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
         matches!(shape, [_, 2, 3] | [_, 6])

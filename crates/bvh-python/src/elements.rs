@@ -5,7 +5,6 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::fmt::Display;
 
-/// Creates the error of an invalid argument.
 pub fn invalid(message: impl Display) -> PyErr {
     PyValueError::new_err(message.to_string())
 }

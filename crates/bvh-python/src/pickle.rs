@@ -14,7 +14,6 @@ use pyo3::types::PyBytes;
 pub type State<'py> =
     (&'static str, Bound<'py, PyBytes>, Bound<'py, PyBytes>, Option<Bound<'py, PyBytes>>, usize);
 
-/// Returns the parts of a tree and of its mesh.
 pub fn state<'py>(
     py: Python<'py>,
     owned: &OwnedTree,
@@ -32,7 +31,6 @@ pub fn state<'py>(
     Ok((shape, objects, bytes(&tree), faces, vertices))
 }
 
-/// Restores a tree.
 pub fn tree(py: Python, shape: &str, objects: &[u8], tree: &[u8]) -> PyResult<OwnedTree> {
     let objects = match shape {
         "triangles" => Objects::Shapes(f32::shapes(numbers("objects", objects)?)),

@@ -1,6 +1,7 @@
 //! What differs between trees over triangles in `float32` and in `float64`.
 
-use crate::elements::{Number, invalid};
+use crate::elements::Number;
+use crate::scalars::named;
 use bvh_search::OwnedTree;
 use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::bvh_core::{
@@ -23,13 +24,8 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Reads the argument `precision`.
     pub fn read(precision: &str) -> PyResult<Self> {
-        match precision {
-            "single" => Ok(Self::Single),
-            "double" => Ok(Self::Double),
-            _ => Err(invalid(format!("precision is {precision:?}; accepted: single, double"))),
-        }
+        named("precision", precision, [("single", Self::Single), ("double", Self::Double)])
     }
 
     pub fn of_tree(tree: &OwnedTree) -> Self {

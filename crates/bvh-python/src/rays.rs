@@ -3,6 +3,7 @@
 use crate::arrays::{Array, given, numbers};
 use crate::elements::invalid;
 use crate::precision::{Point, Precision, Real};
+use crate::scalars::named;
 use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::bvh_core::{Orientation, Select};
 use pyo3::prelude::*;
@@ -109,32 +110,14 @@ fn at<T>(elements: &[T], index: usize) -> &T {
     elements.get(index).unwrap_or(&elements[0])
 }
 
-/// The arrays of rays. Each has one element for all rays or one per ray.
-pub struct RayArrays<'py> {
-    pub rays: usize,
+/// The origins and the directions of rays: one for all rays, or one per ray.
+pub struct Ends<'py> {
     origins: Vectors<'py>,
     directions: Vectors<'py>,
-    limits: [Vec<f64>; 2],
-    /// Whether an invalid ray hits nothing, instead of being an error.
-    misses: bool,
 }
 
-impl<'py> RayArrays<'py> {
-    /// Reads the arguments of a call. `invalid` is `error` or `miss`.
-    pub fn read(
-        origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
-        [t_min, t_max]: [Option<&Bound<'py, PyAny>>; 2],
-        invalid: &str,
-    ) -> PyResult<Self> {
-        let misses = match invalid {
-            "error" => false,
-            "miss" => true,
-            _ => {
-                let message = format!("invalid is {invalid:?}; accepted: error, miss");
-                return Err(self::invalid(message));
-            }
-        };
+impl<'py> Ends<'py> {
+    pub fn read(origins: &Bound<'py, PyAny>, directions: &Bound<'py, PyAny>) -> PyResult<Self> {
         let are_vectors = |shape: &[usize]| matches!(shape, [_, 3] | [3]);
         let origins = Vectors::read("origins", origins, "(m, 3) or (3,)", are_vectors)?;
         let accepted = match origins.len() {
@@ -145,43 +128,42 @@ impl<'py> RayArrays<'py> {
             are_vectors(shape) && (origins.len() == 1 || matches!(shape, [3] | [1, 3]))
                 || shape == [origins.len(), 3]
         })?;
-        let rays = if origins.len() == 1 { directions.len() } else { origins.len() };
-        let accepted = format!("a number or ({rays},), as origins");
-        let mut limits = [vec![0.0], vec![f64::INFINITY]];
-        for ((name, argument), limit) in
-            [("t_min", t_min), ("t_max", t_max)].into_iter().zip(&mut limits)
-        {
-            if let Some(argument) = argument {
-                // An array without axes is one number for all rays.
-                *limit = numbers::<f64>(name, argument, &accepted, |shape| {
-                    shape.is_empty() || shape == [rays]
-                })?
-                .elements()?
-                .to_vec();
-            }
-        }
-        Ok(Self { rays, origins, directions, limits, misses })
+        Ok(Self { origins, directions })
     }
 
-    /// Returns the rays for threads without Python.
-    pub fn source(&self) -> PyResult<RaySource<'_>> {
-        Ok(RaySource {
-            origins: self.origins.slice()?,
-            directions: self.directions.slice()?,
-            limits: self.limits.each_ref().map(Vec::as_slice),
-            rays: self.rays,
-            misses: self.misses,
-        })
+    /// Reads the other arguments of a call, and returns the rays for threads without Python. An
+    /// `invalid` ray is an `error` or a `miss`.
+    pub fn source(
+        &self,
+        [t_min, t_max]: [Option<&Bound<PyAny>>; 2],
+        invalid: &str,
+    ) -> PyResult<RaySource<'_>> {
+        let Self { origins, directions } = self;
+        let misses = named("invalid", invalid, [("error", false), ("miss", true)])?;
+        let rays = if origins.len() == 1 { directions.len() } else { origins.len() };
+        let accepted = format!("a number or ({rays},), as origins");
+        let limit = |name, argument: Option<&Bound<PyAny>>, default| match argument {
+            // An array without axes is one number for all rays.
+            Some(argument) => numbers::<f64>(name, argument, &accepted, |shape| {
+                shape.is_empty() || shape == [rays]
+            })
+            .and_then(|numbers| Ok(numbers.elements()?.to_vec())),
+            None => Ok(vec![default]),
+        };
+        let limits = [limit("t_min", t_min, 0.0)?, limit("t_max", t_max, f64::INFINITY)?];
+        let (origins, directions) = (origins.slice()?, directions.slice()?);
+        Ok(RaySource { origins, directions, limits, rays, misses })
     }
 }
 
 /// Rays in arrays.
-#[derive(Clone, Copy)]
 pub struct RaySource<'a> {
     origins: VectorSlice<'a>,
     directions: VectorSlice<'a>,
-    limits: [&'a [f64]; 2],
+    /// Each for all rays, or one per ray.
+    limits: [Vec<f64>; 2],
     pub rays: usize,
+    /// Whether an invalid ray hits nothing, instead of being an error.
     misses: bool,
 }
 
@@ -192,7 +174,7 @@ impl RaySource<'_> {
         for index in (number * size..self.rays).take(size) {
             let origin = self.origins.at(index);
             let direction = self.directions.at(index);
-            let limits = self.limits.map(|limits| *at(limits, index));
+            let limits = self.limits.each_ref().map(|limits| *at(limits, index));
             rays.push(match N::ray(origin, direction, limits) {
                 Err(_) if self.misses => {
                     // An empty range hits nothing.
@@ -222,15 +204,9 @@ impl Selection {
         rays: usize,
         triangles: usize,
     ) -> PyResult<Self> {
-        let sides = [
-            ("any", Orientation::Any),
-            ("exiting", Orientation::Exiting),
-            ("entering", Orientation::Entering),
-        ];
-        let Some((_, orientation)) = sides.into_iter().find(|side| side.0 == orientation) else {
-            let accepted = sides.map(|side| side.0).join(", ");
-            return Err(invalid(format!("orientation is {orientation:?}; accepted: {accepted}")));
-        };
+        use Orientation::{Any, Entering, Exiting};
+        let sides = [("any", Any), ("exiting", Exiting), ("entering", Entering)];
+        let orientation = named("orientation", orientation, sides)?;
         let Some(exclude) = exclude else {
             return Ok(Self { orientation, excluded: vec![], each: 0 });
         };

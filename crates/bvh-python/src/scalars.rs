@@ -1,5 +1,5 @@
-//! Converts and checks arguments that are one number. Errors name the argument, the number found
-//! and the numbers accepted.
+//! Converts and checks arguments that are one number or name. Errors name the argument, what was
+//! found and what is accepted.
 
 use crate::elements::invalid;
 use pyo3::conversion::FromPyObjectOwned;
@@ -8,25 +8,20 @@ use pyo3::prelude::*;
 
 const ALL_BITS: &str = "0 to 18446744073709551615";
 
-/// The accepted times.
 pub const SECONDS: &str = "0 to 1e19";
 
-/// Reads the argument `seconds`.
 pub fn seconds(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
     optional("seconds", argument, SECONDS)
 }
 
-/// Reads the argument `references`.
 pub fn references(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
     optional("references", argument, "1 to 16")
 }
 
-/// Reads the argument `seed`.
 pub fn seed(argument: &Bound<PyAny>) -> PyResult<u64> {
     number("seed", argument, ALL_BITS)
 }
 
-/// Reads the argument `work`.
 pub fn work(argument: &Bound<PyAny>) -> PyResult<Option<u64>> {
     optional("work", argument, ALL_BITS)
 }
@@ -40,6 +35,14 @@ pub fn count(name: &str, argument: &Bound<PyAny>) -> PyResult<u32> {
         return Err(invalid(format!("{name} is {count}; accepted: {accepted}")));
     }
     Ok(count)
+}
+
+/// Returns the value with the name that an argument has.
+pub fn named<T, const N: usize>(argument: &str, name: &str, values: [(&str, T); N]) -> PyResult<T> {
+    let accepted = values.each_ref().map(|value| value.0).join(", ");
+    let found = values.into_iter().find(|value| value.0 == name);
+    let wrong = || invalid(format!("{argument} is {name:?}; accepted: {accepted}"));
+    found.map(|value| value.1).ok_or_else(wrong)
 }
 
 fn optional<'py, T: FromPyObjectOwned<'py, Error = PyErr>>(

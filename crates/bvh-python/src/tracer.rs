@@ -6,7 +6,8 @@ use crate::arrays::numbers;
 use crate::arrays::{Column, Rows};
 use crate::elements::invalid;
 use crate::precision::Real;
-use crate::rays::{RayArrays, Selection, points};
+use crate::rays::{Ends, Selection, points};
+use crate::scalars::named;
 use crate::sky::Views;
 use crate::threads::detached;
 use crate::tree::Tree;
@@ -109,9 +110,10 @@ impl Tracer {
         invalid: &str,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Reals<'py>, Column<'py, i32>)> {
-        let rays = RayArrays::read(origins, directions, [t_min, t_max], invalid)?;
-        let select = self.selection(orientation, exclude, rays.rays)?;
-        let (source, hint) = (rays.source()?, self.hint(coherent));
+        let ends = Ends::read(origins, directions)?;
+        let source = &ends.source([t_min, t_max], invalid)?;
+        let select = Selection::read(orientation, exclude, source.rays, self.source.objects())?;
+        let hint = self.hint(coherent);
         call!(self, origins.py(), progress, call, N => call.nearest(source, &select, hint))
     }
 
@@ -133,9 +135,10 @@ impl Tracer {
         invalid: &str,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Column<'py, bool>> {
-        let rays = RayArrays::read(origins, directions, [t_min, t_max], invalid)?;
-        let select = self.selection(orientation, exclude, rays.rays)?;
-        let (source, hint) = (rays.source()?, self.hint(coherent));
+        let ends = Ends::read(origins, directions)?;
+        let source = &ends.source([t_min, t_max], invalid)?;
+        let select = Selection::read(orientation, exclude, source.rays, self.source.objects())?;
+        let hint = self.hint(coherent);
         call!(self, origins.py(), progress, call, N => call.any(source, &select, hint))
     }
 
@@ -156,8 +159,8 @@ impl Tracer {
         invalid: &str,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Reals<'py>, Column<'py, i32>, Column<'py, i64>)> {
-        let rays = RayArrays::read(origins, directions, [t_min, t_max], invalid)?;
-        let source = rays.source()?;
+        let ends = Ends::read(origins, directions)?;
+        let source = &ends.source([t_min, t_max], invalid)?;
         call!(self, origins.py(), progress, call, N => call.all(source))
     }
 
@@ -176,8 +179,8 @@ impl Tracer {
         invalid: &str,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Column<'py, u32>> {
-        let rays = RayArrays::read(origins, directions, [t_min, t_max], invalid)?;
-        let source = rays.source()?;
+        let ends = Ends::read(origins, directions)?;
+        let source = &ends.source([t_min, t_max], invalid)?;
         call!(self, origins.py(), progress, call, N => call.counts(source))
     }
 
@@ -214,7 +217,9 @@ impl Tracer {
     ) -> PyResult<Column<'py, bool>> {
         let (rule, solid) = (rule(by)?, self.solid(points.py())?);
         call!(self, points.py(), progress, call, N => {
-            call.contains(solid, &self::points::<N>(points)?, rule)
+            call.of_points(&self::points::<N>(points)?, |layout, points, inside| {
+                solid.contains(layout, points, rule, inside);
+            })
         })
     }
 
@@ -248,7 +253,9 @@ impl Tracer {
     ) -> PyResult<Column<'py, f64>> {
         let (rule, solid) = (rule(by)?, self.solid(points.py())?);
         call!(self, points.py(), progress, call, N => {
-            call.signed_distances(solid, &self::points::<N>(points)?, rule)
+            call.of_points(&self::points::<N>(points)?, |layout, points, distances| {
+                solid.signed_distances(layout, points, rule, distances);
+            })
         })
     }
 
@@ -306,11 +313,12 @@ impl Tracer {
         directions: &Bound<'py, PyAny>,
         triangle: &Bound<'py, PyAny>,
     ) -> PyResult<(Column<'py, f64>, Column<'py, f64>, Reals<'py>)> {
-        let rays = RayArrays::read(origins, directions, [None, None], "miss")?;
-        let accepted = format!("({},), as origins", rays.rays);
+        let ends = Ends::read(origins, directions)?;
+        let source = &ends.source([None, None], "miss")?;
+        let accepted = format!("({},), as origins", source.rays);
         let indices =
-            numbers::<i64>("triangle", triangle, &accepted, |shape| shape == [rays.rays])?;
-        let (source, indices) = (rays.source()?, indices.elements()?);
+            numbers::<i64>("triangle", triangle, &accepted, |shape| shape == [source.rays])?;
+        let indices = indices.elements()?;
         let triangles = self.source.objects();
         if !indices.iter().all(|index| (-1..triangles as i64).contains(index)) {
             let message = format!("triangle: accepted: an index below {triangles} per ray, or -1");
@@ -347,15 +355,6 @@ impl Tracer {
         Ok(self.solid.get_or_init(|| solid))
     }
 
-    fn selection(
-        &self,
-        orientation: &str,
-        exclude: Option<&Bound<PyAny>>,
-        rays: usize,
-    ) -> PyResult<Selection> {
-        Selection::read(orientation, exclude, rays, self.source.objects())
-    }
-
     fn hint(&self, coherent: Option<bool>) -> Hint {
         let size = self.source.tree().root_aabb().map_or(0.0, |aabb| aabb.extent().length());
         Hint { coherent, size }
@@ -363,10 +362,6 @@ impl Tracer {
 }
 
 fn rule(by: &str) -> PyResult<InsideRule> {
-    match by {
-        "auto" => Ok(InsideRule::Auto),
-        "parity" => Ok(InsideRule::Parity),
-        "winding" => Ok(InsideRule::Winding),
-        _ => Err(invalid(format!("by is {by:?}; accepted: auto, parity, winding"))),
-    }
+    use InsideRule::{Auto, Parity, Winding};
+    named("by", by, [("auto", Auto), ("parity", Parity), ("winding", Winding)])
 }

@@ -6,7 +6,7 @@ use crate::elements::invalid;
 use crate::improver::Improver;
 use crate::pickle::{self, State};
 use crate::precision::Precision;
-use crate::scalars;
+use crate::scalars::{self, named};
 use crate::search::{self, Limits};
 use crate::threads::detached;
 use bvh_scenes::files::{self, WriteError};
@@ -109,12 +109,9 @@ impl Tree {
     ) -> PyResult<Self> {
         let (objects, faces) = mesh_objects(vertices, faces, Precision::read(precision)?)?;
         let limits = Limits { seconds, work, progress };
-        let rays = &segments(rays)?;
-        let frame = frames(frame)?;
-        let options = Options { references, seed, rays, frame, ..Options::default() };
-        let mut tree = found(vertices.py(), "vertices", objects, &options, limits)?;
-        tree.faces = Some(Arc::new(faces));
-        Ok(tree)
+        let options = Options { references, seed, frame: frames(frame)?, ..Options::default() };
+        let tree = found(vertices.py(), "vertices", objects, &options, rays, limits)?;
+        Ok(Self { faces: Some(Arc::new(faces)), ..tree })
     }
 
     /// Searches for the best tree over triangles, `(n, 3, 3)`.
@@ -136,10 +133,8 @@ impl Tree {
     ) -> PyResult<Self> {
         let objects = self::triangles(triangles, Precision::read(precision)?)?;
         let limits = Limits { seconds, work, progress };
-        let rays = &segments(rays)?;
-        let frame = frames(frame)?;
-        let options = Options { references, seed, rays, frame, ..Options::default() };
-        found(triangles.py(), "triangles", objects, &options, limits)
+        let options = Options { references, seed, frame: frames(frame)?, ..Options::default() };
+        found(triangles.py(), "triangles", objects, &options, rays, limits)
     }
 
     /// Searches for the best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first.
@@ -156,8 +151,8 @@ impl Tree {
         rays: Option<&Bound<PyAny>>,
     ) -> PyResult<Self> {
         let limits = Limits { seconds, work, progress };
-        let options = Options { seed, rays: &segments(rays)?, ..Options::default() };
-        found(boxes.py(), "boxes", self::boxes(boxes)?, &options, limits)
+        let options = Options { seed, ..Options::default() };
+        found(boxes.py(), "boxes", self::boxes(boxes)?, &options, rays, limits)
     }
 
     /// Loads the tree in a file. The mesh, triangles or boxes must be the ones that it was saved for.
@@ -295,17 +290,13 @@ impl Tree {
     /// True
     #[pyo3(signature = (kind = "internal_area"))]
     fn cost(&self, kind: &str) -> PyResult<f64> {
-        let objective = match kind {
-            "internal_area" => Objective::InternalArea,
-            "goldsmith_salmon" => Objective::GoldsmithSalmon,
-            "sah" => Objective::Sah(SahConstants::default()),
-            "layout" => Objective::Layout,
-            _ => {
-                let accepted = "internal_area, goldsmith_salmon, sah, layout";
-                return Err(invalid(format!("kind is {kind:?}; accepted: {accepted}")));
-            }
-        };
-        Ok(self.owned().cost(objective))
+        let objectives = [
+            ("internal_area", Objective::InternalArea),
+            ("goldsmith_salmon", Objective::GoldsmithSalmon),
+            ("sah", Objective::Sah(SahConstants::default())),
+            ("layout", Objective::Layout),
+        ];
+        Ok(self.owned().cost(named("kind", kind, objectives)?))
     }
 
     /// The numbers of the triangles' coordinates: `single`, `float32`, as those of all boxes, or
@@ -403,31 +394,29 @@ impl Tree {
     }
 }
 
+fn frames(frame: &str) -> PyResult<Frames> {
+    named("frame", frame, [("auto", Frames::Auto), ("file", Frames::File)])
+}
+
+/// Searches for a tree, whose objects are the argument called `name`.
 fn found(
     py: Python,
     name: &str,
     objects: Objects,
     options: &Options,
+    rays: Option<&Bound<PyAny>>,
     limits: Limits,
 ) -> PyResult<Tree> {
+    let rays = &segments(rays)?;
     let (found, raised) = search::run(py, limits, |budget, observer| {
         let anywhere: Option<Anywhere> = Some(bvh_scenes::rays::anywhere);
-        OwnedTree::find(objects, &Options { budget, anywhere, ..*options }, observer)
+        OwnedTree::find(objects, &Options { rays, budget, anywhere, ..*options }, observer)
     })?;
     raised?;
     found.map(Tree::new).map_err(|error| match error {
         BakeError::Rays(_) | BakeError::Search(SearchError::OutOfRange(_)) => invalid(error),
         BakeError::Search(_) => invalid_argument(name, error),
     })
-}
-
-/// Reads the argument `frame`.
-fn frames(frame: &str) -> PyResult<Frames> {
-    match frame {
-        "auto" => Ok(Frames::Auto),
-        "file" => Ok(Frames::File),
-        _ => Err(invalid(format!("frame is {frame:?}; accepted: auto, file"))),
-    }
 }
 
 fn invalid_argument(name: &str, error: impl Display) -> PyErr {

@@ -311,8 +311,7 @@ impl<'a> Bake<'a> {
             },
         );
         validated?;
-        let name = self.method.map_or("best", |(name, _)| name);
-        let name = if self.rays.is_some() { format!("{name} for rays") } else { name.into() };
+        let name = self.name();
         let doubles = match self.shapes {
             Some(Primitives::Doubles(triangles)) => &triangles[..],
             _ => &[],
@@ -322,6 +321,12 @@ impl<'a> Bake<'a> {
         let boxes = along_file.as_deref().unwrap_or(self.boxes);
         let sections = file::sections(tree, boxes, cost, &origin, &parallel::call_both)?;
         Ok(write(&sections.each_ref().map(|section| &**section)))
+    }
+
+    /// The method and whether it is for rays, in words: the origin that the file names.
+    pub fn name(&self) -> String {
+        let name = self.method.map_or("best", |(name, _)| name);
+        if self.rays.is_some() { format!("{name} for rays") } else { name.into() }
     }
 
     fn visits(&self, tree: &Bvh) -> Vec<f32> {

@@ -110,20 +110,19 @@ impl Chosen {
         }
     }
 
-    /// The tests of rays in the wide layout of a tree, in a unit that its frame decides: of the rays
-    /// that judged combinations, otherwise of those that the tree is for, or of random lines.
-    /// O(nodes).
-    pub fn tests(&self, tree: &Bvh) -> f64 {
+    /// The tests of rays in the wide layout of a tree, per ray that enters it: of the rays that judged
+    /// combinations, otherwise of those that the tree is for; or of random lines, in units of area.
+    /// These numbers compare with those of trees along other axes. O(nodes).
+    pub fn tests_per_ray(&self, tree: &Bvh) -> f64 {
+        per_ray(tree, self.judging.as_ref().or(self.density.as_ref()))
+    }
+
+    /// The same tests in a unit that the frame decides, so that those of parts add up.
+    fn tests(&self, tree: &Bvh) -> f64 {
         match self.judging.as_ref().or(self.density.as_ref()) {
             Some(density) => Objective::Layout.cost_by(tree, density),
             None => Objective::Layout.cost(tree),
         }
-    }
-
-    /// The same tests per ray that enters the tree, or by random lines in units of area: numbers that
-    /// compare with those of trees along other axes. O(nodes).
-    pub fn tests_per_ray(&self, tree: &Bvh) -> f64 {
-        per_ray(tree, self.judging.as_ref().or(self.density.as_ref()))
     }
 
     /// The [tests per ray](Self::tests_per_ray) in a tree along other axes than the bake's, for which

@@ -249,14 +249,6 @@ impl OwnedTree {
         self.boxes.len()
     }
 
-    /// The box around all objects, along the file's axes. O(n) for a tree in a frame.
-    pub fn bounds(&self) -> Option<Aabb> {
-        match (&self.tree.frame, &self.shapes) {
-            (Some(_), Some(shapes)) => Some(Aabb::union_of(&shapes.boxes())),
-            _ => self.tree.root_aabb(),
-        }
-    }
-
     /// The boxes of the objects, in the tree's frame if it has one.
     pub fn boxes(&self) -> &[Aabb] {
         &self.boxes

@@ -3,7 +3,6 @@
 use std::str::FromStr;
 use std::time::Duration;
 
-/// A budget of time or work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
     /// Time since the search began.
@@ -13,7 +12,6 @@ pub enum Effort {
 }
 
 impl Effort {
-    /// Returns a fraction of this budget.
     pub fn share(self, part: f64) -> Self {
         match self {
             Self::Time(time) => Self::Time(time.mul_f64(part)),
@@ -21,7 +19,6 @@ impl Effort {
         }
     }
 
-    /// Returns the work, unless the budget is a time.
     pub fn work(self) -> Option<u64> {
         match self {
             Self::Time(_) => None,
@@ -48,7 +45,6 @@ impl FromStr for Effort {
     }
 }
 
-/// Parses an amount of work, such as `50M`.
 fn work(amount: &str) -> Option<u64> {
     let units = [("k", 1_000), ("M", 1_000_000), ("G", 1_000_000_000), ("", 1)];
     let split = |(name, unit)| Some((amount.strip_suffix(name)?, unit));

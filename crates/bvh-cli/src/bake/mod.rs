@@ -7,20 +7,18 @@ mod watch;
 
 use crate::Error;
 use crate::answer::{Answer, frame_facts, gain, saved, whole};
-use crate::arguments::{input_file, load_scene, output_file, output_or_free, precision_of};
-use crate::export::tracers;
+use crate::arguments::{input_file, load_scene, named, output_file, output_or_free, precision_of};
 use crate::interrupt::{hold, is_interrupted};
 use crate::rays::Rays;
 use bvh_core::Aabb;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_scenes::files::Reserved;
-use bvh_scenes::{Precision, Scene, tree_file};
+use bvh_scenes::{Precision, Scene};
 use bvh_search::{
     Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
 };
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use effort::Effort;
 use plan::{Found, Plan, Start, is_turned};
 use std::path::{Path, PathBuf};
@@ -59,7 +57,8 @@ pub struct BakeArgs {
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
     /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the
     /// default is `layout` with --rays, and `area` otherwise.
-    #[arg(long, value_name = "area|layout", value_parser = costs())]
+    #[arg(long, value_name = "area|layout")]
+    #[arg(value_parser = named([("area", Objective::InternalArea), ("layout", Objective::Layout)]))]
     pub cost: Option<Objective>,
     /// Divide objects among leaves where it pays, up to N references per object, 1 to 16. The cost
     /// then includes the leaves. With --budget, the default is 1; with --from, as many as the tree
@@ -69,19 +68,22 @@ pub struct BakeArgs {
     /// The axes of the boxes: `auto` turns them where that saves area, as it does around a building
     /// that stands obliquely in its file; `file` keeps the file's, as --for, --parts and other
     /// methods than best do. Without it, with --from, those of the tree.
-    #[arg(long, value_name = "auto|file", value_parser = frames(), conflicts_with = "from")]
+    #[arg(long, value_name = "auto|file", conflicts_with = "from")]
+    #[arg(value_parser = named([("auto", Frames::Auto), ("file", Frames::File)]))]
     pub frame: Option<Frames>,
     /// The numbers of the triangles: `single`, to which the coordinates of the file are rounded, or
     /// `double`, as they are in the file. With --from, the default is that of the tree.
-    #[arg(long, value_name = "single|double", value_parser = precisions())]
+    #[arg(long, value_name = "single|double")]
+    #[arg(value_parser = named([("single", Precision::Single), ("double", Precision::Double)]))]
     pub precision: Option<Precision>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
     /// and with as many references as pay there.
-    #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
-    #[arg(conflicts_with_all = ["rays", "parts"])]
+    #[arg(long = "for", value_name = "TRACER", conflicts_with_all = ["rays", "parts"])]
+    #[arg(value_parser = named(Target::ALL.map(|target| (target.name, target))))]
     pub tracer: Option<Target>,
     /// The method, with its default parameters.
-    #[arg(long, value_name = "NAME", default_value = BEST, value_parser = methods())]
+    #[arg(long, value_name = "NAME", default_value = BEST)]
+    #[arg(value_parser = named(Method::all().into_iter().map(|method| (method.name(), method))))]
     pub method: Method,
     /// Continue from the tree of an earlier bake of the same scene; the result is never worse.
     #[arg(long, value_name = "FILE.bvh")]
@@ -105,36 +107,8 @@ pub struct BakeArgs {
 
 const ADVANCED: &str = "Advanced";
 
-fn costs() -> impl TypedValueParser<Value = Objective> {
-    PossibleValuesParser::new(["area", "layout"]).map(|cost| match cost.as_str() {
-        "layout" => Objective::Layout,
-        _ => Objective::InternalArea,
-    })
-}
-
-fn frames() -> impl TypedValueParser<Value = Frames> {
-    PossibleValuesParser::new(["auto", "file"]).map(|frame| match frame.as_str() {
-        "file" => Frames::File,
-        _ => Frames::Auto,
-    })
-}
-
-fn precisions() -> impl TypedValueParser<Value = Precision> {
-    PossibleValuesParser::new(["single", "double"]).map(|precision| match precision.as_str() {
-        "double" => Precision::Double,
-        _ => Precision::Single,
-    })
-}
-
 /// The method that can continue from a given tree and divide objects.
 const BEST: &str = "best";
-
-fn methods() -> impl TypedValueParser<Value = Method> {
-    PossibleValuesParser::new(Method::NAMES).try_map(|name| {
-        let named = Method::all().into_iter().find(|method| method.name() == name);
-        named.ok_or("expected one of the methods")
-    })
-}
 
 /// Searches until the budget is spent or the user interrupts, writes the best tree, and prints its
 /// cost. An interrupted bake writes the file as well, unless the file has a better tree of the scene,
@@ -174,7 +148,6 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     Ok(())
 }
 
-/// Lists the steps that the scene does not need and that are skipped, one line each.
 fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), Error> {
     let skipped = shortcuts::of(&scene.boxes).map_err(Error::search(&scene.name, "--explain"))?;
     let size = Aabb::union_of(&scene.boxes).extent().as_vec3();
@@ -186,7 +159,6 @@ fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes the file of the tree, and describes it.
 fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> Result<(), Error> {
     if is_interrupted() && found.is_behind(out) {
         return Err(Error::Interrupted(format!(
@@ -200,10 +172,7 @@ fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> R
         let (out, next) = (out.display(), continues(out));
         return Err(Error::Interrupted(format!("the best tree so far is in {out}; {next}")));
     }
-    let header = tree_file::header(out)?;
-    answer.record("method", header.method.as_str());
-    answer.record("cost", header.cost);
-    summarise(found, &header.method, answer);
+    summarise(found, answer);
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
     answer.record("file", out.display().to_string());
     answer.record("bytes", bytes);
@@ -215,9 +184,10 @@ fn continues(out: &Path) -> String {
     format!("`--from {0} --out {0}` continues, `--out {0}` begins again", out.display())
 }
 
-fn summarise(found: &Found, method: &str, answer: &mut Answer) {
+fn summarise(found: &Found, answer: &mut Answer) {
     let Found { plan, scene, chosen, baked, greedy, seconds, .. } = found;
     let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
+    let method = found.settled().name();
     let objects = scene.boxes.len();
     let references = tree.prim_ids.len();
     answer.say(&format!(
@@ -228,6 +198,7 @@ fn summarise(found: &Found, method: &str, answer: &mut Answer) {
         plan.seed
     ));
     answer.record("scene", scene.name.as_str());
+    answer.record("method", method);
     answer.record("objects", objects);
     answer.record("references", references);
     answer.record("frame", frame_facts(tree.frame.as_ref()));
@@ -246,6 +217,7 @@ fn summarise(found: &Found, method: &str, answer: &mut Answer) {
         answer.record("saved", saved(area, base));
     }
     // The cost in the file is that for random lines and whole objects.
+    answer.record("cost", chosen.objective.cost(tree));
     answer.record("minimised_cost", *cost);
     // The gain in area is no measure of a search for another cost.
     if let (Some(base), Some(unit)) = (baked.greedy_cost, found.unit()) {
@@ -289,7 +261,6 @@ fn summarise(found: &Found, method: &str, answer: &mut Answer) {
     answer.record("seconds", *seconds);
 }
 
-/// Names the commands that people want next.
 fn next(args: &BakeArgs, found: &Found, out: &Path, answer: &Answer) {
     let (out, scene) = (out.display(), &args.scene);
     let tracer = args.tracer.map_or("TRACER", |target| target.name);

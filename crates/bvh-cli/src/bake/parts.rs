@@ -75,13 +75,8 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
             continue;
         }
         let scene = part.scene(&scene);
-        let found = part.plan.search(
-            &scene,
-            None,
-            &Open::default(),
-            Watch::new(part.plan.effort),
-            answer,
-        )?;
+        let watch = Watch::new(part.plan.effort);
+        let found = part.plan.search(&scene, None, &Open::default(), watch, answer)?;
         // A part whose search was cut short would differ from run to run.
         if is_interrupted() {
             let folder = folder.display();
@@ -207,7 +202,6 @@ fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
     whole
 }
 
-/// Writes the tree over a part of a scene.
 fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Error> {
     found.save(path, Reserved::new(path, 0, false)?)?;
     let cost = found.baked.outcome.cost;
@@ -251,13 +245,11 @@ mod tests {
                 assert!(all.into_iter().eq(0..boxes.len()), "{case}");
                 let sizes = parts.iter().map(Vec::len);
                 assert!(sizes.clone().max().unwrap() <= sizes.min().unwrap() + 7, "{case}");
-                let trees: Vec<Bvh> = parts
-                    .iter()
-                    .map(|part| {
-                        let boxes: Vec<Aabb> = part.iter().map(|&object| boxes[object]).collect();
-                        config.build(&boxes).unwrap()
-                    })
-                    .collect();
+                let tree = |part: &Vec<usize>| {
+                    let boxes: Vec<Aabb> = part.iter().map(|&object| boxes[object]).collect();
+                    config.build(&boxes).unwrap()
+                };
+                let trees: Vec<Bvh> = parts.iter().map(tree).collect();
                 let roots: Vec<Aabb> = trees.iter().filter_map(Bvh::root_aabb).collect();
                 let objects: Vec<&[usize]> = parts.iter().map(|part| &part[..]).collect();
                 let whole = joined(&config.build(&roots).unwrap(), &trees, &objects);

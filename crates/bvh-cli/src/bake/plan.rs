@@ -187,11 +187,14 @@ pub struct Found<'a> {
 }
 
 impl Found<'_> {
+    /// The search with all its choices.
+    pub fn settled(&self) -> Bake<'_> {
+        self.chosen.bake(&self.plan.bake(self.scene))
+    }
+
     /// Writes the file of the tree. Returns its number of bytes.
     pub fn save(&self, path: &Path, reserved: Reserved) -> Result<usize, Error> {
-        let bake = self.plan.bake(self.scene);
-        let settled = self.chosen.bake(&bake);
-        let written = settled.write(&self.baked.outcome.tree, self.work, |sections| {
+        let written = self.settled().write(&self.baked.outcome.tree, self.work, |sections| {
             reserved.write(sections)?;
             Ok(sections.iter().map(|section| section.len()).sum())
         });
@@ -203,10 +206,9 @@ impl Found<'_> {
     pub fn is_behind(&self, path: &Path) -> bool {
         let Ok((old, _)) = tree_file::load(path, self.scene) else { return false };
         let Baked { outcome, greedy_cost, division, .. } = &self.baked;
-        let bake = self.plan.bake(self.scene);
-        let settled = self.chosen.bake(&bake);
-        let [old, new] = [&old, &outcome.tree].map(|tree| {
-            if self.is_tried { self.chosen.tests(tree) } else { settled.cost(tree, *division) }
+        let [old, new] = [&old, &outcome.tree].map(|tree| match self.is_tried {
+            true => self.chosen.tests_per_ray(tree),
+            false => self.settled().cost(tree, *division),
         });
         // The old tree may be for another cost, by which a greedy tree would be behind.
         old <= new || *greedy_cost == Some(outcome.cost)

@@ -6,7 +6,7 @@ use crate::interrupt::is_interrupted;
 use crate::output::{Lines, bar, print_error};
 use bvh_search::{Deadline, Event, Observer};
 use indicatif::ProgressBar;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::OnceLock;
 use std::time::Duration;
 
 /// The length of the bar: thousandths of the budget.
@@ -20,8 +20,8 @@ pub struct Watch {
     /// The time of the command, and its end if the budget is a time.
     pub deadline: Deadline,
     effort: Option<Effort>,
-    /// The bits of the first cost, NaN before.
-    first: AtomicU64,
+    /// The first cost.
+    first: OnceLock<f64>,
     lines: Lines,
 }
 
@@ -33,7 +33,7 @@ impl Watch {
             bar: bar(LENGTH as u64, "{bar:10} {wide_msg} {eta} left").with_message("searching"),
             deadline: Deadline::after(limit),
             effort,
-            first: AtomicU64::new(f64::NAN.to_bits()),
+            first: OnceLock::new(),
             lines: Lines::default(),
         }
     }
@@ -53,10 +53,7 @@ impl Watch {
 impl Observer for Watch {
     fn event(&self, event: &Event) {
         let cost = event.incumbent;
-        let _ = self.first.fetch_update(Relaxed, Relaxed, |bits| {
-            f64::from_bits(bits).is_nan().then_some(cost.to_bits())
-        });
-        let first = f64::from_bits(self.first.load(Relaxed));
+        let first = *self.first.get_or_init(|| cost);
         self.bar.set_message(format!("searching, cost {}", gain(cost, first)));
     }
 

@@ -30,7 +30,6 @@ pub struct Looks {
     pub by_cosine: bool,
 }
 
-/// Parses the name of a sky.
 pub fn built_in(text: &str) -> Result<Sky, String> {
     const MOST: u32 = 100_000;
     let uniform = || text.strip_prefix("uniform:")?.parse().ok();
@@ -44,7 +43,6 @@ pub fn built_in(text: &str) -> Result<Sky, String> {
     }
 }
 
-/// Parses a place by its latitude and its longitude.
 pub fn place(text: &str) -> Result<Location, String> {
     let accepted = "accepted: degrees north and east as in 47.4,8.5";
     let (latitude, longitude) = text.split_once(',').ok_or(accepted)?;
@@ -57,7 +55,6 @@ pub fn place(text: &str) -> Result<Location, String> {
     }
 }
 
-/// Parses a date.
 pub fn date(text: &str) -> Result<Date, String> {
     let midnight = parse_rfc3339_weak(&format!("{text} 00:00:00")).ok();
     let since = midnight.and_then(|midnight| midnight.duration_since(UNIX_EPOCH).ok());
@@ -70,7 +67,6 @@ pub fn date(text: &str) -> Result<Date, String> {
     Ok(Date { name: text.to_owned(), julian: 2_440_587.5 + since.as_secs_f64() / 86_400.0 })
 }
 
-/// Parses the minutes between positions of the sun.
 pub fn step(text: &str) -> Result<u32, String> {
     let step = text.parse().ok().filter(|step| *step > 0 && MINUTES.is_multiple_of(*step));
     step.ok_or_else(|| format!("accepted: whole minutes that divide {MINUTES}, a day"))

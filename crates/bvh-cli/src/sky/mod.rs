@@ -6,7 +6,7 @@ mod write;
 
 use crate::Error;
 use crate::answer::{Answer, short, whole};
-use crate::arguments::{input_file, load_scene, output_file};
+use crate::arguments::{input_file, load_scene, named, output_file};
 use crate::bench::Layout;
 use crate::output::Progress;
 use crate::render::CameraArgs;
@@ -15,7 +15,6 @@ use bvh_scenes::rays::Camera;
 use bvh_scenes::{Precision, Scene, SceneError, SceneKind};
 use bvh_search::{BakeError, Deadline, Objects, Options, OwnedTree};
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use directions::{Date, Looks};
 use glam::{DMat3, DVec3, Vec3};
 use points::Points;
@@ -82,7 +81,8 @@ pub struct SkyArgs {
     #[arg(long, value_name = "MINUTES", default_value = "30", value_parser = directions::step)]
     pub step: u32,
     /// The axis that is up: y in glTF, and z in other files and in built-in scenes.
-    #[arg(long, value_name = "x|y|z", value_parser = axis(), hide_possible_values = true)]
+    #[arg(long, value_name = "x|y|z", hide_possible_values = true)]
+    #[arg(value_parser = named([("x", 0usize), ("y", 1), ("z", 2)]))]
     pub up: Option<usize>,
     /// Degrees from the scene's north over east to the true north. North is y where z is up, −z
     /// where y is up, and z where x is up.
@@ -97,10 +97,6 @@ pub struct SkyArgs {
     pub tree: Option<PathBuf>,
     #[command(flatten)]
     pub camera: CameraArgs,
-}
-
-fn axis() -> impl TypedValueParser<Value = usize> {
-    PossibleValuesParser::new(["x", "y", "z"]).map(|axis| usize::from(axis.as_bytes()[0] - b'x'))
 }
 
 fn degrees(text: &str) -> Result<f64, String> {
@@ -123,11 +119,11 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
     let triangles = scene.triangles()?;
     let offset = args.offset(&scene)?;
     let (width, height) = args.camera.size;
-    let made = match (kind, &args.points) {
-        ("png", _) => None,
-        (_, Some(path)) => Some(Points::of_file(path)?),
-        _ if args.per == "vertex" => Some(Points::of_vertices(triangles)),
-        _ => Some(Points::of_triangles(triangles)),
+    let (what, made) = match (kind, &args.points) {
+        ("png", _) => ("pixels", None),
+        (_, Some(path)) => ("points", Some(Points::of_file(path)?)),
+        _ if args.per == "vertex" => ("vertices", Some(Points::of_vertices(triangles))),
+        _ => ("triangles", Some(Points::of_triangles(triangles))),
     };
     let pixels = u64::from(width) * u64::from(height);
     let count = made.as_ref().map_or(pixels, |points| points.at.len() as u64);
@@ -135,12 +131,6 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
     let start = Instant::now();
     let wide = args.layout(&scene, count * directions as u64)?;
     let seconds_to_build = start.elapsed().as_secs_f64();
-    let what = match (kind, &args.points) {
-        ("png", _) => "pixels",
-        (_, Some(_)) => "points",
-        _ if args.per == "vertex" => "vertices",
-        _ => "triangles",
-    };
     let points = made.unwrap_or_else(|| {
         let camera =
             Camera::new(&args.camera.view(&scene, axes.z_axis), axes.z_axis, width, height);
@@ -170,16 +160,13 @@ pub fn sky(args: &SkyArgs, answer: &mut Answer) -> Result<(), Error> {
         "{name}: {}",
         legend.line(kind, if args.sun.is_some() { " hours" } else { "" })
     ));
-    answer.say(&format!("{}", args.out.display()));
-    let facts = [
-        ("mean", mean),
-        ("minimum", legend.least),
-        ("maximum", legend.most),
-        ("offset", offset),
-        ("seconds_to_build", seconds_to_build),
-        ("seconds", seconds),
-    ];
-    facts.into_iter().for_each(|(name, value)| answer.record(name, value));
+    answer.say(&args.out.display().to_string());
+    answer.record("mean", mean);
+    answer.record("minimum", legend.least);
+    answer.record("maximum", legend.most);
+    answer.record("offset", offset);
+    answer.record("seconds_to_build", seconds_to_build);
+    answer.record("seconds", seconds);
     answer.record("points", count);
     answer.record("directions", directions);
     answer.record("columns", looks.columns);
@@ -219,19 +206,18 @@ fn seen(
     };
     let sides: &[f64] = if args.two_sided { &[1.0, -1.0] } else { &[1.0] };
     let progress = Progress::new((points.at.len() * sides.len()) as u64, "points");
-    let mut values = Vec::new();
-    for &side in sides {
+    let from_side = |&side: &f64| {
         let at = points.above(side * offset);
-        let normals: Option<Vec<Vec3>> = normals
-            .as_ref()
-            .map(|normals| normals.iter().map(|normal| normal * side as f32).collect());
+        let turned =
+            |normals: &Vec<Vec3>| normals.iter().map(|normal| normal * side as f32).collect();
+        let normals: Option<Vec<Vec3>> = normals.as_ref().map(turned);
         let view = View { points: &at, normals: normals.as_deref() };
-        let seen = seen_from(&looks.sky, wide, view, looks.by_cosine, &|count| progress.add(count));
-        values = match values.is_empty() {
-            true => seen,
-            false => values.iter().zip(seen).map(|(one, other)| one.max(other)).collect(),
-        };
-    }
+        seen_from(&looks.sky, wide, view, looks.by_cosine, &|count| progress.add(count))
+    };
+    let larger = |one: Vec<f64>, other: Vec<f64>| {
+        one.iter().zip(other).map(|(one, other)| one.max(other)).collect()
+    };
+    let values = sides.iter().map(from_side).reduce(larger).unwrap_or_default();
     progress.end();
     values
 }

@@ -1,6 +1,6 @@
 //! Turning meshes from the command line.
 
-use crate::support::{bvh, facts};
+use crate::support::{bvh, facts, obj};
 use bvh_scenes::Scene;
 use glam::{DMat3, DVec3};
 use std::fs;
@@ -11,18 +11,13 @@ fn an_oblique_mesh_gets_smaller_boxes_and_is_turned_once() {
     let at = folder.path();
     // The walls and floors of a building that stands obliquely.
     let turn = DMat3::from_rotation_z(0.6) * DMat3::from_rotation_x(0.4);
-    let mut obj = String::new();
-    for i in 0..300 {
+    let walls = (0..300).map(|i| {
         let place = DVec3::new(f64::from(i % 17), f64::from(i * 7 % 23), 0.0);
-        let wall =
+        let [x, y] =
             [[DVec3::X, DVec3::Z], [DVec3::Y, DVec3::Z], [DVec3::X, DVec3::Y]][i as usize % 3];
-        for corner in [place, place + 9.0 * wall[0], place + 2.0 * wall[1]] {
-            let [x, y, z] = (turn * corner).as_vec3().to_array();
-            obj += &format!("v {x} {y} {z}\n");
-        }
-        obj += "f -3 -2 -1\n";
-    }
-    fs::write(at.join("walls.obj"), obj).unwrap();
+        [place, place + 9.0 * x, place + 2.0 * y].map(|corner| turn * corner)
+    });
+    fs::write(at.join("walls.obj"), obj(walls)).unwrap();
     let facts = facts(at, "orient walls.obj --out=new.obj --report");
     let mesh = &facts["meshes"][0];
     assert!(mesh["triangles"] == 300 && mesh["saved"].as_f64() > Some(0.2), "{mesh}");

@@ -1,7 +1,7 @@
 //! `bvh sky` from the command line.
 
-use crate::support::{bvh, facts, number};
-use std::fmt::Write;
+use crate::support::{bvh, facts, number, obj};
+use glam::DVec3;
 use std::fs;
 use std::path::Path;
 
@@ -12,22 +12,10 @@ fn rows(file: &Path) -> Vec<Vec<f64>> {
     text.lines().skip(1).map(row).collect()
 }
 
-/// Writes a file of triangles, each of three corners.
-fn write_mesh(file: &Path, triangles: &[[[f64; 3]; 3]]) {
-    let mut text = String::new();
-    for [x, y, z] in triangles.iter().flatten() {
-        writeln!(text, "v {x} {y} {z}").unwrap();
-    }
-    for first in (0..triangles.len()).map(|number| 3 * number + 1) {
-        writeln!(text, "f {first} {} {}", first + 1, first + 2).unwrap();
-    }
-    fs::write(file, text).unwrap();
-}
-
 /// A rectangle from three of its corners.
-fn rectangle(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [[[f64; 3]; 3]; 2] {
-    let d = [0, 1, 2].map(|axis| a[axis] - b[axis] + c[axis]);
-    [[a, b, c], [a, c, d]]
+fn rectangle(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [[DVec3; 3]; 2] {
+    let [a, b, c] = [a, b, c].map(DVec3::from);
+    [[a, b, c], [a, c, a - b + c]]
 }
 
 #[test]
@@ -36,15 +24,13 @@ fn the_view_of_the_sky_from_a_street_is_that_of_its_formula_for_points_of_every_
     let at = folder.path();
     // Walls of height 1 at x = -1 and x = 1, on each side of the street along y.
     let wall = |x: f64| rectangle([x, -1e4, 0.0], [x, 1e4, 0.0], [x, 1e4, 1.0]);
-    write_mesh(&at.join("street.obj"), &[wall(-1.0), wall(1.0)].concat());
+    fs::write(at.join("street.obj"), obj([wall(-1.0), wall(1.0)].concat())).unwrap();
     let xs = [-0.9, -0.5, 0.0, 0.7f32];
-    let points: Vec<[f32; 3]> = xs.iter().map(|&x| [x, 0.0, 0.0]).collect();
-    let line = |[x, y, z]: &[f32; 3]| format!("{x},{y},{z}");
-    let lines: Vec<String> = points.iter().map(line).collect();
+    let lines = xs.map(|x| format!("{x},0,0"));
     fs::write(at.join("p.csv"), format!("x,y,z\n{}\n", lines.join("\n"))).unwrap();
-    let bytes = points.as_flattened().iter().map(|x| x.to_le_bytes()).collect::<Vec<_>>().concat();
     let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 3), }\n";
     let length = (header.len() as u16).to_le_bytes();
+    let bytes = xs.map(|x| [x, 0.0, 0.0].map(f32::to_le_bytes)).concat().concat();
     let npy = [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), &bytes].concat();
     fs::write(at.join("p.npy"), npy).unwrap();
     // Columns between semicolons, and normals.
@@ -72,7 +58,7 @@ fn weights_of_free_directions_on_the_side_of_the_normal_are_summed_in_columns() 
     // A floor that is free but for a roof high above its first triangle, whose front is below.
     let floor = rectangle([0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [9.0, 9.0, 0.0]);
     let roof = rectangle([5.0, 0.0, 5.0], [5.0, 9.0, 5.0], [9.0, 9.0, 5.0]);
-    write_mesh(&at.join("roof.obj"), &[floor, roof].concat());
+    fs::write(at.join("roof.obj"), obj([floor, roof].concat())).unwrap();
     fs::write(at.join("d.csv"), "x,y,z,h,kWh\n0,0,2,1,10\n\n0,0,-1,2,20\n4,0,1,4,40\n").unwrap();
     let sky = "sky roof.obj --directions=d.csv --out=x.csv";
     let values = |line: &str| -> Vec<[f64; 2]> {
@@ -93,7 +79,7 @@ fn a_roof_hides_the_sun_as_long_as_the_sun_takes_across_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let roof = rectangle([2.0, -9.0, 5.0], [2.0, 9.0, 5.0], [6.0, 9.0, 5.0]);
-    write_mesh(&at.join("roof.obj"), &roof);
+    fs::write(at.join("roof.obj"), obj(roof)).unwrap();
     fs::write(at.join("p.csv"), "0,0,0\n").unwrap();
     let hours = |more: &str| {
         let sun = "--sun=0,0 --dates=2026-03-20 --step=5";

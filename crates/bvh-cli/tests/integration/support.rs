@@ -1,19 +1,16 @@
 //! The program `bvh` as a child process, by its command lines.
 #![allow(dead_code, unused_imports)] // each test file uses some of it
 
-#[path = "../../../bvh-scenes/tests/integration/glb.rs"]
-mod glb;
 #[path = "../program/mod.rs"]
 mod program;
 
-pub use glb::glb;
+use glam::DVec3;
 pub use program::*;
 use serde_json::{Map, Value};
 use std::path::Path;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_bvh");
 
-/// Splits a command line at its spaces.
 pub fn words(line: &str) -> Vec<&str> {
     line.split_whitespace().collect()
 }
@@ -30,17 +27,27 @@ pub fn wrong(at: &Path, line: &str, parts: &[&str]) {
     assert!(output.stdout.is_empty(), "{line}: {}", text(&output.stdout));
 }
 
+/// Returns an OBJ file of triangles.
+pub fn obj(triangles: impl IntoIterator<Item = [DVec3; 3]>) -> String {
+    let mut text = String::new();
+    for corners in triangles {
+        for DVec3 { x, y, z } in corners {
+            text += &format!("v {x} {y} {z}\n");
+        }
+        text += "f -3 -2 -1\n";
+    }
+    text
+}
+
 /// Returns the results of a command, with all digits.
 pub fn facts(at: &Path, line: &str) -> Map<String, Value> {
     serde_json::from_str(&bvh(at, &format!("{line} --json"))).unwrap()
 }
 
-/// Returns a result of a command that is a number.
 pub fn number(at: &Path, line: &str, name: &str) -> f64 {
     facts(at, line)[name].as_f64().unwrap()
 }
 
-/// Returns the internal area of the tree in a file.
 pub fn cost(at: &Path, file: &str) -> f64 {
     number(at, &format!("inspect {file}"), "area")
 }

@@ -11,7 +11,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// Returns the project's folder.
 pub fn top() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
@@ -31,14 +30,12 @@ pub fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// Creates a folder with a spec of this name.
 pub fn folder_with(spec: &str, text: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join(spec), text).unwrap();
     folder
 }
 
-/// Returns the sorted names of a folder's entries.
 pub fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .unwrap()
@@ -73,7 +70,6 @@ pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Option<Out
     Some(output.unwrap())
 }
 
-/// Waits until a file or folder exists.
 pub fn wait_for(path: &Path) {
     wait_until(&path.display().to_string(), || path.exists());
 }
@@ -126,7 +122,6 @@ pub fn begin(folder: &Path, args: &[&str]) -> Child {
     program(folder, args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Sends a signal, such as `-INT`.
 pub fn send(signal: &str, to: &Child) {
     let status = Command::new("kill").args([signal, &to.id().to_string()]).status();
     assert!(status.unwrap().success());

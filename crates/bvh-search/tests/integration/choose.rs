@@ -123,8 +123,8 @@ fn a_cancelled_choice_keeps_the_best_tree_that_it_tried() {
         let found = chosen(&scene, &BUT_RAYS, &Before(last, AtomicUsize::new(0)));
         assert_eq!((found.tried.is_some(), found.reasons.len()), (has_tree, 0), "{last}");
         let Some(baked) = found.tried.as_ref() else { continue };
-        let greedy = found.tests(found.greedy.as_ref().unwrap());
-        assert!(found.tests(&baked.outcome.tree) < greedy);
+        let greedy = found.tests_per_ray(found.greedy.as_ref().unwrap());
+        assert!(found.tests_per_ray(&baked.outcome.tree) < greedy);
     }
 }
 
