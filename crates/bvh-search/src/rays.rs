@@ -41,9 +41,12 @@ pub fn ray_density(
     let step = segments.len().div_ceil(most).max(1);
     let mut sampled: Vec<Segment> = segments.iter().step_by(step).copied().collect();
     let count = sampled.len() / (GUARD - 1);
+    let none = TestCounts::default();
     sampled.extend(match shapes {
-        Some(Primitives::Triangles(triangles)) => traced(tree, triangles, &bounds, count, is_over),
-        Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &bounds, count, is_over),
+        Some(Primitives::Triangles(triangles)) => {
+            traced(tree, triangles, &bounds, count, none, is_over)
+        }
+        Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &bounds, count, none, is_over),
         Some(Primitives::Doubles(_)) | None => vec![],
     });
     if is_over() {
@@ -58,19 +61,19 @@ pub fn ray_density(
 /// Returns the segments of `count` rays, up to their nearest hits: from random points of the
 /// scene's box in random directions, and from each hit one more. They are the same on every
 /// machine. Ends early, with fewer rays, when `is_over` returns true or they take
-/// [too many tests](RayDensity::MOST_TESTS).
+/// [too many tests](RayDensity::MOST_TESTS) with those that earlier rays took.
 fn traced<P: Primitive>(
     tree: &Bvh,
     objects: &[P],
     bounds: &Aabb,
     count: usize,
+    mut tests: TestCounts,
     is_over: &dyn Fn() -> bool,
 ) -> Vec<Segment> {
     let extent = bounds.max - bounds.min;
     let mut rng = Stream::seed_from_u64(1);
     let mut segments = Vec::with_capacity(count);
     let mut bounce = None;
-    let mut tests = TestCounts::default();
     for _ in 0..count {
         if is_over() || !RayDensity::affords(&tests, 1.0) {
             break;
@@ -121,6 +124,8 @@ mod tests {
         (triangles.clone(), Primitives::Triangles(triangles), tree)
     }
 
+    const NONE: TestCounts = TestCounts { boxes: 0, objects: 0 };
+
     /// Ends at the first wall.
     const RECORDED: Segment = Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] };
 
@@ -136,7 +141,7 @@ mod tests {
         let guarded = density(Some(&shapes));
         assert_eq!(guarded.segments(), 400);
         assert!(guarded.entries(&last) > 1.0, "{}", guarded.entries(&last));
-        let segments = traced(&tree, &triangles, &Aabb::union_of(&boxes), 1000, &|| false);
+        let segments = traced(&tree, &triangles, &Aabb::union_of(&boxes), 1000, NONE, &|| false);
         let ends = segments.iter().map(|segment| Vec3::from(segment.to));
         let is_on_a_wall = |end: &Vec3| {
             (end.x - end.x.round()).abs() < 1e-4
@@ -158,7 +163,7 @@ mod tests {
         assert!((squares - 1.0 / 3.0).abs().max_element() < 0.01, "{squares}");
         let (triangles, _, tree) = walls();
         let bounds = Aabb::union_of(&bvh_core::boxes(&triangles));
-        let segments = traced(&tree, &triangles, &bounds, 500, &|| false);
+        let segments = traced(&tree, &triangles, &bounds, 500, NONE, &|| false);
         let mut bounces = 0;
         for pair in segments.windows(2) {
             let [from, end, next] = [pair[0].from, pair[0].to, pair[1].from].map(Vec3::from);
@@ -176,8 +181,10 @@ mod tests {
         let triangle = Triangle::from([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
         let leaf = Node::leaf(triangle.aabb(), 0, 30_000);
         let tree = Bvh { nodes: vec![leaf], prim_ids: (0..30_000).collect(), ..Bvh::default() };
-        let segments = traced(&tree, &[triangle; 30_000], &triangle.aabb(), 20_000, &|| false);
-        assert!((5_000..10_000).contains(&segments.len()), "{}", segments.len());
+        let taken = TestCounts { objects: RayDensity::MOST_TESTS - 1_000_000, ..NONE };
+        let segments =
+            traced(&tree, &[triangle; 30_000], &triangle.aabb(), 20_000, taken, &|| false);
+        assert_eq!(segments.len(), 1_000_000 / 30_000 + 1);
     }
 
     #[test]

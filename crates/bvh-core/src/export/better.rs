@@ -11,7 +11,7 @@ use glam::DVec3;
 const RAYS: u32 = 4096;
 /// The tests after which no more rays are traced: half a second. Where objects are as large as the
 /// scene, fewer rays must do.
-const MOST_TESTS: u64 = 1 << 26;
+const MOST_TESTS: u64 = if cfg!(test) { 1 << 21 } else { 1 << 26 };
 
 /// A tree for a tracer, by [`Target::fit_better`].
 #[derive(Clone, Debug, PartialEq)]
@@ -210,7 +210,7 @@ mod tests {
         for target in [Target::PLAIN, Target::THREE_MESH_BVH] {
             let costs = target.counted_costs([&tree; 2], &triangles);
             assert_eq!(costs[0], costs[1]);
-            assert!(costs[0].iter().all(|&cost| (1e6..1e8).contains(&cost)), "{costs:?}");
+            assert!(costs[0].iter().all(|&cost| (1e5..1e7).contains(&cost)), "{costs:?}");
         }
     }
 

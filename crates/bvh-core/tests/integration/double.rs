@@ -145,7 +145,7 @@ fn every_kernel_answers_as_a_test_of_every_triangle() {
     let mut random = Random(32);
     let mut hits = 0;
     for (name, triangles) in scenes(&mut random) {
-        let rays = rays(&triangles, 120, &mut random);
+        let rays = rays(&triangles, 40, &mut random);
         let excluded: Vec<u32> = rays
             .iter()
             .map(|ray| {
@@ -212,7 +212,7 @@ fn every_kernel_answers_as_a_test_of_every_triangle() {
             }
         }
     }
-    assert!(hits > 2000, "{hits}");
+    assert!(hits > 700, "{hits}");
 }
 
 #[test]
