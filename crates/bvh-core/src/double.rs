@@ -233,6 +233,7 @@ impl<'a> Select<'a> {
 
 /// A hit of a ray with a triangle in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DHit {
     /// The distance, in multiples of the direction's length.
     pub t: f64,

@@ -197,6 +197,7 @@ impl Ray {
 
 /// A hit of a ray with an object, in the layout that C has for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Hit {
     /// The distance, in multiples of the direction's length.
