@@ -120,7 +120,6 @@ struct ThreeMeshRay<'a> {
     nodes: &'a [ThreeMeshNode],
     ids: &'a [u32],
     triangles: &'a [Triangle],
-    ray: &'a Ray,
     prepared: PreparedRay,
     slabs: Slabs,
     counts: &'a mut TestCounts,
@@ -131,11 +130,11 @@ impl<'a> ThreeMeshRay<'a> {
         nodes: &'a [ThreeMeshNode],
         ids: &'a [u32],
         triangles: &'a [Triangle],
-        ray: &'a Ray,
+        ray: &Ray,
         counts: &'a mut TestCounts,
     ) -> Self {
         let (prepared, slabs) = (PreparedRay::new(ray), Slabs::new(ray, &nodes[0].aabb()));
-        Self { nodes, ids, triangles, ray, prepared, slabs, counts }
+        Self { nodes, ids, triangles, prepared, slabs, counts }
     }
 
     /// Returns the distance of the first hit below a node, infinite without one. Recursive, as the
@@ -151,8 +150,7 @@ impl<'a> ThreeMeshRay<'a> {
         }
         let axis = axis_or_count as usize;
         let [low, high] = [index + 1, index + below as usize];
-        let [origin, direction] =
-            [self.ray.origin(), self.ray.direction()].map(|vector| f64::from(vector[axis]));
+        let [origin, direction] = self.slabs.ray.ends().map(|vector| f64::from(vector[axis]));
         let (first, second) = if direction >= 0.0 { (low, high) } else { (high, low) };
         let found = if self.meets(first) { self.first_hit(first) } else { f32::INFINITY };
         let point = origin + f64::from(found) * direction;

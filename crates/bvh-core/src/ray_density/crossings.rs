@@ -37,13 +37,8 @@ struct Clipped {
 
 impl Crossings {
     pub fn new() -> Self {
-        let unvisited = || vec![0; POINTS * CELLS * CELLS];
-        let faces = || [unvisited(), unvisited()];
-        Self {
-            segments: 0,
-            starts: vec![0; CELLS * CELLS * CELLS],
-            faces: [faces(), faces(), faces()],
-        }
+        let faces = [[(); 2]; 3].map(|ways| ways.map(|()| vec![0; POINTS * CELLS * CELLS]));
+        Self { segments: 0, starts: vec![0; CELLS * CELLS * CELLS], faces }
     }
 
     /// Records the cells that a segment visits within the grid, face by face. Coordinates are in
@@ -81,18 +76,12 @@ impl Crossings {
 
     /// Returns the tables of signed counts, one per corner of a box; see [the measure](super).
     pub fn corner_tables(&self) -> Vec<Corner> {
-        let sums = Sums {
-            starts: summed_starts(&self.starts),
-            faces: self
-                .faces
-                .each_ref()
-                .map(|ways| ways.each_ref().map(|faces| summed_faces(faces))),
-        };
+        let summed = |ways: &[Vec<u32>; 2]| ways.each_ref().map(|faces| summed_faces(faces));
+        let faces = self.faces.each_ref().map(summed);
+        let sums = Sums { starts: summed_starts(&self.starts), faces };
         let mut tables = Vec::with_capacity(8 * CELLS * CELLS * CELLS);
         for cell in cells() {
-            for corner in 0..8 {
-                tables.push(sums.around(cell, corner));
-            }
+            tables.extend((0..8).map(|corner| sums.around(cell, corner)));
         }
         tables
     }

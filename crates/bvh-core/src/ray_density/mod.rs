@@ -237,13 +237,9 @@ impl RayDensity {
     pub fn visits_of(&self, root: &Aabb, nodes: &[Node]) -> Vec<f32> {
         let root = self.measure(root);
         let scale = if root > 0.0 { 1.0 / root } else { 0.0 };
-        let mut visits = Vec::with_capacity(nodes.len());
-        for node in nodes {
-            // Rounding must not give a child more visits than the root.
-            let relative = (self.measure(&node.aabb) * scale) as f32;
-            visits.push(relative.min(1.0));
-        }
-        visits
+        // Rounding must not give a child more visits than the root.
+        let visits = |node: &Node| ((self.measure(&node.aabb) * scale) as f32).min(1.0);
+        nodes.iter().map(visits).collect()
     }
 
     /// Returns the entries times 512³, an integer.

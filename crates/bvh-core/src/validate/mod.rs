@@ -205,12 +205,8 @@ pub(crate) fn check_structure(
             NodeKind::Leaf { first, count } => {
                 let range = node.prims();
                 if count < 1 || range.end > references {
-                    return Err(InvalidBvh::BadLeaf {
-                        node: index,
-                        first,
-                        count,
-                        objects: references,
-                    });
+                    let (node, objects) = (index, references);
+                    return Err(InvalidBvh::BadLeaf { node, first, count, objects });
                 }
                 prims += range.len();
                 for position in range {

@@ -1,8 +1,8 @@
 //! Traversals of what is next to edges, and their counts.
 
-use crate::support::{Random, SHAPES, boxes, chain, tree};
+use crate::support::{self, Random, SHAPES, boxes, chain, tree};
 use bvh_core::{
-    Aabb, Bvh, PreparedRay, Ray, TestCounts, Triangle, WideBvh, any_hit_by, clip_to_box,
+    Aabb, Bvh, Hit, PreparedRay, Ray, TestCounts, Triangle, WideBvh, any_hit_by, clip_to_box,
     nearest_hit_by,
 };
 use glam::Vec3;
@@ -71,10 +71,15 @@ fn counts_include_the_root_and_stop_at_the_first_hit() {
     assert_eq!(tests_of_nearest(&tree, &boxes, &forwards), TestCounts { boxes: 3, objects: 1 });
     let backwards = Ray::half_line(middle + Vec3::X * 9.0, -Vec3::X).unwrap();
     assert_eq!(tests_of_any(&tree, &backwards), TestCounts { boxes: 7, objects: 1 });
-    // No object is hit: every node is visited.
+    // No object is hit: every node is visited, and none by a call of its own.
+    let triangles = vec![Triangle([Vec3::ZERO, Vec3::Y * 9.0, Vec3::Z * 9.0]); 20_000];
+    let deep = chain(&support::boxes(&triangles));
     let mut counts = TestCounts::default();
-    assert!(!any_hit_by(&tree, &forwards, |_| false, &mut counts));
-    assert_eq!((counts, tree.depth()), (TestCounts { boxes: 7, objects: 4 }, 3));
+    assert!(!any_hit_by(&deep, &forwards, |_| false, &mut counts));
+    let expected = TestCounts { boxes: 39_999, objects: 20_000 };
+    assert_eq!((counts, deep.depth()), (expected, 19_999));
+    let wide = WideBvh::new(&deep, &triangles).unwrap();
+    assert_eq!(wide.nearest_hit(&forwards), Some(Hit { t: 0.5, object: 0 }));
     // A ray that misses the root tests only the root's box.
     let past = Ray::half_line(middle + Vec3::X * 9.0, Vec3::X).unwrap();
     assert_eq!(tests_of_nearest(&tree, &boxes, &past), TestCounts { boxes: 1, objects: 0 });
