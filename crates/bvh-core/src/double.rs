@@ -26,6 +26,8 @@ impl From<[[f64; 3]; 3]> for DTriangle {
 
 /// The points `origin + t · direction` with `t_min <= t <= t_max`, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
+// In this order vector kernels load it; no register of four numbers then crosses a line of the cache.
+#[repr(C, align(32))]
 pub struct DRay {
     pub(crate) origin: DVec3,
     pub(crate) direction: DVec3,
@@ -313,7 +315,7 @@ impl DTriangle {
         let line = Line::new(ray.origin, ray.direction);
         let t = match line.filter(&self.0) {
             // It crosses, and twice f64 nearly always rounds its distance.
-            Verdict::Between(..) => line.rounded(ends, &self.0),
+            Verdict::Between(..) => Line::rounded(ends, &self.0),
             _ => line.crossing(ends, &self.0, is_moved)?,
         };
         ray.is_in_range(t).then_some(t)
@@ -410,6 +412,10 @@ impl Query<'_> {
     #[cold]
     #[inline(never)]
     pub(crate) fn take_close(&self, nearest: &mut NearestHit, mut new: NearestHit) -> bool {
+        // A divided triangle is in several leaves.
+        if new.object == nearest.object {
+            return false;
+        }
         for narrow in [Self::narrow, Self::resolve] {
             for hit in [&mut new, &mut *nearest] {
                 if !hit.is_known() {
@@ -448,7 +454,7 @@ impl Query<'_> {
     /// Finds the rounded distance.
     pub(crate) fn resolve(&self, hit: &mut NearestHit) {
         let DTriangle(corners) = &self.triangles[hit.object as usize];
-        hit.low = self.line().rounded(self.ends(), corners);
+        hit.low = Line::rounded(self.ends(), corners);
         hit.high = hit.low;
     }
 

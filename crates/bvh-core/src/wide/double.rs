@@ -18,18 +18,18 @@
 //! [`pairs`](super::pairs) has uR and nothing. The frame's own errors are below 2⁻³⁷ of both.
 //!
 //! With k = 1, a sheared coordinate is off by less than 14.4 uR and an edge value by less than
-//! 4 · 14.4 uRm + 8.5 uRm and a square: less than e (m + e) with e = 128 uR. A difference of depths
+//! 4 · 14.4 uRm + 8.5 uRm and a square: less than e (m + e) with e = 72 uR. A difference of depths
 //! is off by 10 uR, X by 5EΔ / |a| + (55 + 17) uR, and the other terms together by 36 uR: less than
-//! e, too. So the bounds of f32 hold with 2kR for R. Ends of a range are rounded to f32: beyond the
+//! 128 uR. So the bounds of f32 hold with 2kR for R. Ends of a range are rounded to f32: beyond the
 //! slack |T − t| exceeds u|t|, so that t and the end itself are on the same sides. A half of the largest extent is never more than
 //! R, and so k is at most S over that half.
 
 use super::answer::{ANY_HIT, Bounded, NEAREST_HIT};
 use super::box_ray::{BoxRay, FarBoxRay};
-use super::double_block::{DoubleBlock, rounded_distance};
+use super::double_block::{DoubleBlock, rounded_distance, splat};
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{SPARE, STACK, deep_stacks};
-use super::lanes::{Aligned, Lanes};
+use super::lanes::{Aligned, DoubleLanes, Lanes};
 use super::layout::{WideBvh, WideNode};
 use super::one_ray::{LeafRay, Leaves, visit};
 use super::triangles::TriangleBlock;
@@ -42,7 +42,7 @@ use crate::{
 };
 use bytemuck::Zeroable;
 use core::mem::MaybeUninit;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec4};
 use std::borrow::Cow;
 
 /// An immutable copy of a tree and its triangles in f64, for tracing only.
@@ -70,6 +70,8 @@ pub struct DWideBvh {
     /// The triangles in f32, in the frame.
     pub(super) wide: WideBvh,
     pub(super) frame: Frame,
+    /// The axes of the file in the frame.
+    columns: [[f64; 4]; 3],
     /// By id.
     pub(super) triangles: Box<[DTriangle]>,
 }
@@ -105,7 +107,9 @@ impl DWideBvh {
             wide.bounds = framed.bounds;
             wide.near = framed.near;
         }
-        Ok(Self { wide, frame, triangles: triangles.into() })
+        let [x, y, z] = frame.axes;
+        let columns = [0, 1, 2].map(|axis| [x[axis], y[axis], z[axis], 0.0]);
+        Ok(Self { wide, frame, columns, triangles: triangles.into() })
     }
 
     /// Returns the boxes of triangles in a frame, to build a tree over.
@@ -199,6 +203,43 @@ impl DWideBvh {
         Boxed { ray, ends }
     }
 
+    /// Returns the same, but for operations that are fused: an axis of the frame per lane.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`, which has four lanes.
+    #[inline(always)]
+    unsafe fn boxed_by<L: Lanes>(&self, ray: &DRay) -> Boxed {
+        const { assert!(L::N == 4) };
+        let unit = ray.unit();
+        let ends = [ray.origin, ray.direction * unit];
+        let mut vectors = [Vec4::ZERO; 3];
+        // SAFETY: the processor has the instructions; a vector has four numbers.
+        unsafe {
+            let [origin, direction, inverse] = vectors.each_mut().map(|vector| (&raw mut *vector).cast());
+            L::single(self.turned::<L>(ray.origin - self.frame.centre)).store(origin);
+            let along = self.turned::<L>(ends[1]);
+            L::single(along).store(direction);
+            L::single(along.filled(Frame::ABOVE) / along).store(inverse);
+        }
+        let [origin, direction, inverse] = vectors.map(Vec4::truncate);
+        let [t_min, t_max] = [single(ray.t_min, unit), single(ray.t_max, unit)];
+        Boxed { ray: Ray::with_inverse(origin, direction, inverse, t_min, t_max), ends }
+    }
+
+    /// Returns the components of a direction in the frame, a lane each.
+    #[inline(always)]
+    unsafe fn turned<L: Lanes>(&self, direction: DVec3) -> L::Double {
+        // SAFETY: the processor has the instructions; a column has four numbers.
+        unsafe {
+            let [x, y, z] = splat::<L>(direction);
+            let [first, second, third] = &self.columns;
+            let first = L::Double::load(first.as_ptr());
+            let second = L::Double::load(second.as_ptr());
+            let third = L::Double::load(third.as_ptr());
+            z.mul_add(third, y.mul_add(second, x * first))
+        }
+    }
+
     /// Finds the nearest hit that counts, or with `ANY` any. Returns whether there is one.
     pub(super) fn search<const ANY: bool>(&self, query: Query, nearest: &mut NearestHit) -> bool {
         if self.wide.kernel != Kernel::Portable {
@@ -253,9 +294,6 @@ impl DWideBvh {
             if new.high < nearest.low {
                 *nearest = new;
                 is_nearer = true;
-                let triangle = (&raw const query.triangles[object as usize]).cast();
-                // SAFETY: the processor has the instructions.
-                unsafe { K::prefetch_bytes(triangle, size_of::<DTriangle>()) };
             } else if new.low <= nearest.high {
                 is_nearer |= query.take_close(nearest, new);
             }
@@ -324,7 +362,7 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
         let Self { layout, query, nearest } = self;
         // SAFETY: the processor has the instructions.
         unsafe {
-            let boxed = layout.boxed(query.ray);
+            let boxed = layout.boxed_by::<K::Block>(query.ray);
             let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &layout.wide);
             let mut leaves = Candidates::<_, ANY> { layout, leaf_ray, query, nearest };
             let hit = traverse::<K, ANY>(layout, &boxed, &mut leaves);
@@ -378,7 +416,7 @@ impl<K: Instructions> Task<K> for AllHits<'_> {
     unsafe fn run(self) {
         // SAFETY: the processor has the instructions.
         unsafe {
-            let boxed = self.layout.boxed(self.ray);
+            let boxed = self.layout.boxed_by::<K::Block>(self.ray);
             let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &self.layout.wide);
             let layout = self.layout;
             traverse::<K, ANY_HIT>(layout, &boxed, &mut AllCandidates { leaf_ray, hits: self });
@@ -439,8 +477,11 @@ impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block
             high.store(bounded.high.as_mut_ptr());
             let is_nearer = self.layout.offer_block::<K>(self.query, self.nearest, block, &bounded);
             if is_nearer {
+                let object = self.nearest.object;
                 let t = single(self.nearest.high, self.nearest.unit);
-                *nearest = Hit { t, object: self.nearest.object };
+                *nearest = Hit { t, object };
+                let triangle = self.query.triangles.as_ptr().wrapping_add(object as usize);
+                K::prefetch_bytes(triangle.cast(), size_of::<DTriangle>());
             }
             is_nearer
         }

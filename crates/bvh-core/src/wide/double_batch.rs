@@ -3,15 +3,15 @@
 
 use super::answer::{ANY_HIT, Bounded, Find, Known, NEAREST_HIT};
 use super::double::{DWideBvh, single};
-use super::double_block::Distances;
+use super::double_block::{RAYS, gathered, rounded_distances};
 use super::instructions::{Instructions, Task};
-use super::lanes::{Aligned, DoubleLanes, Lanes};
+use super::lanes::{DoubleLanes, Lanes};
 use super::layout::WideBvh;
 use super::ray_lanes::{BoxLanes, RayLanes, Rays, in_frame};
 use super::triangles::TriangleBlock;
 use super::vector;
 use crate::double::{NearestHit, Query};
-use crate::{Coherence, DHit, DRay, Frame, Hit, Kernel, Select};
+use crate::{Coherence, DHit, DRay, DTriangle, Frame, Hit, Kernel, Select};
 
 /// The number of rays of which something is kept at a time.
 const AT_ONCE: usize = 4096;
@@ -108,6 +108,9 @@ impl DWideBvh {
     }
 }
 
+/// By how many rays the triangles that they hit are fetched ahead.
+const AHEAD: usize = 16;
+
 /// The search for distances that are not known yet.
 struct Resolve<'a> {
     layout: &'a DWideBvh,
@@ -121,21 +124,31 @@ impl<K: Instructions> Task<K> for Resolve<'_> {
     #[inline(always)]
     unsafe fn run(self) {
         let Self { layout, rays, nearest } = self;
-        let mut distances = Distances::EMPTY;
-        let mut numbers = [0; Distances::COUNT];
+        let triangle = |object: u32| layout.triangles.as_ptr().wrapping_add(object as usize);
+        // Lanes without a hit have others of these.
+        let mut their_rays = [rays.as_ptr(); RAYS];
+        let mut their_triangles = [layout.triangles.as_ptr(); RAYS];
+        let mut numbers = [0; RAYS];
         let mut count = 0;
         for number in 0..nearest.len() {
+            if let Some(ahead) = nearest.get(number + AHEAD) {
+                let triangle = triangle(ahead.object).cast();
+                // SAFETY: the processor has the instructions; a prefetch may name any address.
+                unsafe { K::prefetch_bytes(triangle, size_of::<DTriangle>()) };
+            }
             let hit = nearest[number];
             if !hit.is_known() {
-                distances.set(count, &rays[number], &layout.triangles[hit.object as usize]);
+                their_rays[count] = &rays[number];
+                their_triangles[count] = triangle(hit.object);
                 numbers[count] = number;
                 count += 1;
             }
             if count < K::Rays::N && (number + 1 < nearest.len() || count == 0) {
                 continue;
             }
-            // SAFETY: the processor has the instructions.
-            let (rounded, is_decided) = unsafe { distances.rounded::<K::Rays>() };
+            // SAFETY: the processor has the instructions; the rays and what they hit exist.
+            let (rounded, is_decided) =
+                unsafe { rounded_distances::<K::Rays>(&their_rays, &their_triangles) };
             for (lane, &number) in numbers[..count].iter().enumerate() {
                 if is_decided >> lane & 1 != 0 {
                     let hit = &mut nearest[number];
@@ -209,26 +222,16 @@ impl Rays for DRays<'_> {
         end: usize,
         _: Option<&Frame>,
     ) -> (RayLanes<L>, BoxLanes<L>) {
-        let mut rows = Aligned([[0.0; 16]; 9]);
-        for lane in 0..L::N {
-            // SAFETY: there is a ray before the end.
-            let ray = unsafe { self.rays.get_unchecked((first + lane).min(end - 1)) };
-            let unit = ray.unit();
-            for axis in 0..3 {
-                rows.0[axis][lane] = ray.origin[axis];
-                rows.0[3 + axis][lane] = ray.direction[axis] * unit;
-            }
-            rows.0[6][lane] = ray.t_min;
-            rows.0[7][lane] = ray.t_max;
-            rows.0[8][lane] = unit;
-        }
-        // SAFETY: the processor has the instructions; there are so many numbers.
+        let last = end - 1 - first;
+        let ray = |lane: usize| self.rays.as_ptr().wrapping_add(first + lane.min(last)).cast();
+        // SAFETY: the processor has the instructions; the rays exist.
         unsafe {
-            let [x, y, z] = load::<L>(&rows.0, 0);
-            let [dx, dy, dz] = load::<L>(&rows.0, 3);
-            let [t_min, t_max, unit] = load::<L>(&rows.0, 6);
-            let size = unit.filled(1.0) / unit;
-            let (direction, boxed) = in_frame::<L>([x, y, z], [dx, dy, dz], self.frame);
+            let rays = core::array::from_fn(ray);
+            let [x, y, z, dx, dy, dz, t_min, t_max] = gathered::<L::Double, 8>(&rays);
+            let size = dx.abs().max(dy.abs()).max(dz.abs()).power_of_two();
+            let unit = size.filled(1.0) / size;
+            let along = [dx * unit, dy * unit, dz * unit];
+            let (direction, boxed) = in_frame::<L>([x, y, z], along, self.frame);
             let t_min = L::single(t_min * size);
             let t_max = L::single(t_max * size);
             let most = t_max.filled(f32::MAX);
@@ -242,19 +245,6 @@ impl Rays for DRays<'_> {
         let next = self.rays.as_ptr().wrapping_add(first).cast::<u8>();
         // SAFETY: a prefetch may name any address.
         unsafe { K::prefetch_bytes(next, K::Rays::N * size_of::<DRay>()) };
-    }
-}
-
-/// Loads three rows.
-#[inline(always)]
-unsafe fn load<L: Lanes>(rows: &[[f64; 16]; 9], first: usize) -> [L::Double; 3] {
-    // SAFETY: the processor has the instructions; there are so many numbers.
-    unsafe {
-        [
-            L::Double::load(rows[first].as_ptr()),
-            L::Double::load(rows[first + 1].as_ptr()),
-            L::Double::load(rows[first + 2].as_ptr()),
-        ]
     }
 }
 

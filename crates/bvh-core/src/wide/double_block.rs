@@ -4,8 +4,7 @@
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::triangles::TriangleBlock;
 use crate::double::largest_axis;
-use crate::exact::AXES;
-use crate::exact::{ERROR, NARROWER, Twice, distance};
+use crate::exact::{AXES, ERROR, Twice, distance};
 use crate::{DRay, DTriangle};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -109,12 +108,12 @@ impl DoubleBlock {
 }
 
 /// A component of a vector in every lane, by axis.
-type Vector<D> = [D; 3];
+pub(super) type Vector<D> = [D; 3];
 
 // These are functions, since closures may not be compiled with the instructions.
 
 #[inline(always)]
-unsafe fn splat<L: Lanes>(point: DVec3) -> Vector<L::Double> {
+pub(super) unsafe fn splat<L: Lanes>(point: DVec3) -> Vector<L::Double> {
     // SAFETY: the processor has the instructions.
     unsafe { [L::Double::splat(point.x), L::Double::splat(point.y), L::Double::splat(point.z)] }
 }
@@ -154,16 +153,6 @@ fn dot<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> D {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-#[inline(always)]
-fn difference<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> [Twice<D>; 3] {
-    [Twice::difference(a[0], b[0]), Twice::difference(a[1], b[1]), Twice::difference(a[2], b[2])]
-}
-
-#[inline(always)]
-fn larger<D: DoubleLanes>([x, y, z]: &[Twice<D>; 3]) -> Vector<D> {
-    [x.0, y.0, z.0]
-}
-
 /// Returns the distances of planes, their errors, and where they are known, as in `Line::plane`: by
 /// the corners relative to the origin, the direction and the sides.
 #[inline(always)]
@@ -188,41 +177,46 @@ fn plane<D: DoubleLanes>(
     (t, slack.filled(0.25) * slack / along.abs(), along_error.le(along.abs()))
 }
 
-/// Rays with the triangles that they hit, side by side.
-pub(super) struct Distances {
-    /// Of the rays' origins and directions, and of the triangles' corners.
-    rows: [[f64; Self::COUNT]; 15],
+/// The most rays that one register needs.
+pub(super) const RAYS: usize = 16;
+
+/// Returns the numbers of as many places as there are lanes, side by side.
+///
+/// # Safety
+/// The processor has the instructions; there are `N` numbers at a place per lane.
+#[inline(always)]
+pub(super) unsafe fn gathered<D: DoubleLanes, const N: usize>(
+    from: &[*const f64; RAYS],
+) -> [D; N] {
+    // SAFETY: the processor has the instructions; so many numbers are there.
+    unsafe {
+        let mut numbers = [D::splat(0.0); N];
+        for first in (0..N).step_by(2) {
+            let first = first.min(N - 2);
+            let [a, b] = D::load_twos(&from.map(|from| from.wrapping_add(first)));
+            numbers[first] = a;
+            numbers[first + 1] = b;
+        }
+        numbers
+    }
 }
 
-impl Distances {
-    /// The most that one register needs.
-    pub(super) const COUNT: usize = 16;
-    pub(super) const EMPTY: Self = Self { rows: [[0.0; Self::COUNT]; 15] };
-
-    #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, ray: &DRay, triangle: &DTriangle) {
-        let DTriangle([a, b, c]) = *triangle;
-        for (i, point) in [ray.origin, ray.direction, a, b, c].into_iter().enumerate() {
-            (0..3).for_each(|axis| self.rows[3 * i + axis][lane] = point[axis]);
-        }
-    }
-
-    /// Returns the rounded distances, and a bit for each that is decided.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`.
-    #[inline(always)]
-    pub(super) unsafe fn rounded<L: Lanes>(&self) -> ([f64; Self::COUNT], u32) {
-        // SAFETY: the processor has the instructions; there are so many numbers.
-        unsafe {
-            let mut points = [[L::Double::splat(0.0); 3]; 5];
-            for (point, rows) in points.iter_mut().zip(self.rows.as_chunks::<3>().0) {
-                for (coordinate, row) in point.iter_mut().zip(rows) {
-                    *coordinate = L::Double::load(row.as_ptr());
-                }
-            }
-            rounded::<L>(points)
-        }
+/// Returns the rounded distances of rays and the triangles that they hit, and a bit for each that is
+/// decided.
+///
+/// # Safety
+/// The processor has the instructions; there are a ray and a triangle per lane.
+#[inline(always)]
+pub(super) unsafe fn rounded_distances<L: Lanes>(
+    rays: &[*const DRay; RAYS],
+    triangles: &[*const DTriangle; RAYS],
+) -> ([f64; RAYS], u32) {
+    // SAFETY: the processor has the instructions; these are numbers.
+    unsafe {
+        let [x, y, z, dx, dy, dz] = gathered(&rays.map(|ray| ray.cast()));
+        let [ax, ay, az, bx, by, bz, cx, cy, cz] =
+            gathered(&triangles.map(|triangle| triangle.cast()));
+        rounded::<L>([x, y, z], [dx, dy, dz], [[ax, ay, az], [bx, by, bz], [cx, cy, cz]])
     }
 }
 
@@ -236,27 +230,31 @@ pub(super) unsafe fn rounded_distance<L: Lanes>(ray: &DRay, triangle: &DTriangle
     // SAFETY: the processor has the instructions.
     let (distances, is_decided) = unsafe {
         let [origin, direction] = [splat::<L>(ray.origin), splat::<L>(ray.direction)];
-        rounded::<L>([origin, direction, splat::<L>(a), splat::<L>(b), splat::<L>(c)])
+        rounded::<L>(origin, direction, [splat::<L>(a), splat::<L>(b), splat::<L>(c)])
     };
     (is_decided & 1 != 0).then_some(distances[0])
 }
 
-/// Returns the rounded distances of rays by their origins, directions and the corners of triangles,
-/// and a bit for each that is decided.
 #[inline(always)]
 unsafe fn rounded<L: Lanes>(
-    [origin, direction, a, b, c]: [[L::Double; 3]; 5],
-) -> ([f64; Distances::COUNT], u32) {
-    const { assert!(L::N <= Distances::COUNT) };
-    let (corner, p, q) = (difference(a, origin), difference(b, a), difference(c, a));
-    let Twice(high, low) = distance(&corner, &direction, &p, &q);
-    let sides = [larger(&p), larger(&q)];
-    let (_, slack, is_known) = plane(larger(&corner), direction, sides);
-    let slack = slack * slack.filled(NARROWER);
-    let rounded = high + (low + slack);
-    let is_decided = is_known & rounded.eq(high + (low - slack));
-    let mut distances = [0.0; Distances::COUNT];
+    origin: Vector<L::Double>,
+    direction: Vector<L::Double>,
+    [a, b, c]: [Vector<L::Double>; 3],
+) -> ([f64; RAYS], u32) {
+    const { assert!(L::N <= RAYS) };
+    let [low, high] = distance(
+        difference(a, origin),
+        direction,
+        difference(b, a),
+        difference(c, a),
+    );
+    let mut distances = [0.0; RAYS];
     // SAFETY: there is room. Adding 0 turns −0 into +0.
-    unsafe { (rounded + rounded.filled(0.0)).store(distances.as_mut_ptr()) };
-    (distances, L::narrow(is_decided).bits())
+    unsafe { (low + low.filled(0.0)).store(distances.as_mut_ptr()) };
+    (distances, L::narrow(low.eq(high)).bits())
+}
+
+#[inline(always)]
+fn difference<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> [Twice<D>; 3] {
+    [Twice::difference(a[0], b[0]), Twice::difference(a[1], b[1]), Twice::difference(a[2], b[2])]
 }

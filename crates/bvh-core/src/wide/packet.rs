@@ -125,8 +125,8 @@ impl<K: Instructions> Packet<K> {
                 vector.nearest.object.store(objects.as_mut_ptr().cast());
                 if F::DECIDES && !F::ANY {
                     let known = vector.nearest.known();
-                    for (number, known) in (vector.first..).zip(known).take(K::Rays::N) {
-                        find.learn(number, known);
+                    for lane in 0..K::Rays::N {
+                        find.learn(vector.first + lane, known(lane));
                     }
                     continue;
                 }

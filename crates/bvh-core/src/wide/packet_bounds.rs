@@ -100,7 +100,7 @@ impl<K: Instructions, F: Find> Task<K> for Decide<'_, K::Rays, F> {
             };
             let number = first + ray;
             if !F::ANY {
-                find.learn(number, known[ray]);
+                find.learn(number, known(ray));
             }
             // SAFETY: the processor has the instructions; the block is one of the layout.
             let Some(hit) = (unsafe { find.decide::<K>(number, block, &bounded) }) else {

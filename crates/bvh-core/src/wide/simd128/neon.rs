@@ -28,6 +28,7 @@ macro_rules! functions {
 
 functions! {
     and(Single) vandq_u32,
+    and_double(Double) vandq_u64,
     or(Single) vorrq_u32,
     xor(Single) veorq_u32,
     lt(Single) vcltq_f32,
