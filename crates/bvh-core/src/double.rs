@@ -179,6 +179,11 @@ impl DRay {
         f64::from_bits((2 * BIAS - exponent) << 52)
     }
 
+    /// Returns the origin, and the direction, scaled so that its largest component is about 1.
+    pub(crate) fn scaled_ends(&self) -> [DVec3; 2] {
+        [self.origin, self.direction * self.unit()]
+    }
+
     fn is_in_range(&self, t: f64) -> bool {
         self.t_min <= t && t <= self.t_max
     }

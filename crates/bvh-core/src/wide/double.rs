@@ -25,13 +25,11 @@
 //! R, and so k is at most S over that half.
 
 use super::answer::{ANY_HIT, Bounded, NEAREST_HIT};
-use super::box_ray::{BoxRay, FarBoxRay};
 use super::double_block::{DoubleBlock, rounded_distance, splat};
-use super::instructions::{Instructions, Pending, Task};
-use super::kernel::{SPARE, STACK, deep_stacks};
-use super::lanes::{Aligned, DoubleLanes, Lanes};
+use super::instructions::{Instructions, Task};
+use super::lanes::{DoubleLanes, Lanes};
 use super::layout::{WideBvh, WideNode};
-use super::one_ray::{LeafRay, Leaves, visit};
+use super::one_ray::{Lazy, Leaves, traverse};
 use super::triangles::TriangleBlock;
 use super::{build, portable, vector};
 use crate::double::{NearestHit, Query};
@@ -41,7 +39,6 @@ use crate::{
     Triangle, validate_references,
 };
 use bytemuck::Zeroable;
-use core::mem::MaybeUninit;
 use glam::{DMat3, DVec3, Vec4};
 use std::borrow::Cow;
 
@@ -74,12 +71,6 @@ pub struct DWideBvh {
     columns: [[f64; 4]; 3],
     /// By id.
     pub(super) triangles: Box<[DTriangle]>,
-}
-
-/// A ray as the layout is traversed with it.
-pub(super) struct Boxed {
-    pub(super) ray: Ray,
-    ends: [DVec3; 2],
 }
 
 impl DWideBvh {
@@ -136,13 +127,13 @@ impl DWideBvh {
     /// at the same distance, the one with the lowest id is nearest.
     pub fn nearest_hit(&self, ray: &DRay, select: Select) -> Option<DHit> {
         let mut nearest = NearestHit::new(ray);
-        self.search::<NEAREST_HIT>(self.query(ray, select), &mut nearest);
+        self.search::<NEAREST_HIT>(&self.query(ray, select), &mut nearest);
         nearest.hit()
     }
 
     /// Returns whether `ray` meets any triangle that counts in its range.
     pub fn any_hit(&self, ray: &DRay, select: Select) -> bool {
-        self.search::<ANY_HIT>(self.query(ray, select), &mut NearestHit::new(ray))
+        self.search::<ANY_HIT>(&self.query(ray, select), &mut NearestHit::new(ray))
     }
 
     /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest first;
@@ -151,7 +142,7 @@ impl DWideBvh {
     pub fn all_hits(&self, ray: &DRay) -> Vec<DHit> {
         let mut hits = Vec::new();
         if self.wide.kernel == Kernel::Portable {
-            self.visit_portable::<ANY_HIT>(&self.boxed(ray), |block, _| {
+            self.visit_portable::<ANY_HIT>(ray, |block, _| {
                 block.triangles().for_each(|(object, _)| hits.extend(self.hit_of(ray, object)));
                 false
             });
@@ -175,12 +166,13 @@ impl DWideBvh {
     /// Visits the blocks that a ray enters by [`Kernel::Portable`].
     fn visit_portable<const ANY: bool>(
         &self,
-        boxed: &Boxed,
+        ray: &DRay,
         visit: impl FnMut(&TriangleBlock, &mut Hit) -> bool,
     ) -> Hit {
-        let slabs = Slabs::of_frame(&boxed.ray, boxed.ends, &self.frame, &self.wide.bounds);
+        let boxed = self.boxed(ray);
+        let slabs = Slabs::of_frame(&boxed, ray.scaled_ends(), &self.frame, &self.wide.bounds);
         let intervals = |node: &WideNode| portable::intervals(&slabs, node);
-        portable::traverse::<ANY>(&self.wide, boxed.ray.t_max(), intervals, &mut (), visit)
+        portable::traverse::<ANY>(&self.wide, boxed.t_max(), intervals, &mut (), visit)
     }
 
     pub(super) fn resolve_alone(&self, ray: &DRay, nearest: &mut NearestHit) {
@@ -189,18 +181,20 @@ impl DWideBvh {
         }
     }
 
+    fn far_ray(&self, ray: &DRay) -> FarRay {
+        FarRay::in_frame(ray.scaled_ends(), &self.frame, &self.wide.bounds)
+    }
+
     fn query<'a>(&'a self, ray: &'a DRay, select: Select<'a>) -> Query<'a> {
         Query { triangles: &self.triangles, ray, select }
     }
 
     /// Returns the ray in the frame. Its direction has a largest component of about 1, so that f32
     /// has all distances within the scene.
-    #[inline(always)]
-    pub(super) fn boxed(&self, ray: &DRay) -> Boxed {
+    pub(super) fn boxed(&self, ray: &DRay) -> Ray {
         let unit = ray.unit();
-        let ends = [ray.origin, ray.direction * unit];
-        let ray = self.frame.ray_of(ends, [single(ray.t_min, unit), single(ray.t_max, unit)]);
-        Boxed { ray, ends }
+        let range = [single(ray.t_min, unit), single(ray.t_max, unit)];
+        self.frame.ray_of(ray.scaled_ends(), range)
     }
 
     /// Returns the same, but for operations that are fused: an axis of the frame per lane.
@@ -208,22 +202,23 @@ impl DWideBvh {
     /// # Safety
     /// The processor has the instructions of `L`, which has four lanes.
     #[inline(always)]
-    unsafe fn boxed_by<L: Lanes>(&self, ray: &DRay) -> Boxed {
+    unsafe fn boxed_by<L: Lanes>(&self, ray: &DRay) -> Ray {
         const { assert!(L::N == 4) };
         let unit = ray.unit();
-        let ends = [ray.origin, ray.direction * unit];
         let mut vectors = [Vec4::ZERO; 3];
         // SAFETY: the processor has the instructions; a vector has four numbers.
         unsafe {
-            let [origin, direction, inverse] = vectors.each_mut().map(|vector| (&raw mut *vector).cast());
+            let [origin, direction, inverse] =
+                vectors.each_mut().map(|vector| (&raw mut *vector).cast());
             L::single(self.turned::<L>(ray.origin - self.frame.centre)).store(origin);
-            let along = self.turned::<L>(ends[1]);
-            L::single(along).store(direction);
-            L::single(along.filled(Frame::ABOVE) / along).store(inverse);
+            // The unit is found meanwhile.
+            let along = self.turned::<L>(ray.direction);
+            L::single(along * along.filled(unit)).store(direction);
+            L::single(along.filled(Frame::ABOVE * inverse_of_unit(unit)) / along).store(inverse);
         }
         let [origin, direction, inverse] = vectors.map(Vec4::truncate);
         let [t_min, t_max] = [single(ray.t_min, unit), single(ray.t_max, unit)];
-        Boxed { ray: Ray::with_inverse(origin, direction, inverse, t_min, t_max), ends }
+        Ray::with_inverse(origin, direction, inverse, t_min, t_max)
     }
 
     /// Returns the components of a direction in the frame, a lane each.
@@ -241,13 +236,12 @@ impl DWideBvh {
     }
 
     /// Finds the nearest hit that counts, or with `ANY` any. Returns whether there is one.
-    pub(super) fn search<const ANY: bool>(&self, query: Query, nearest: &mut NearestHit) -> bool {
+    pub(super) fn search<const ANY: bool>(&self, query: &Query, nearest: &mut NearestHit) -> bool {
         if self.wide.kernel != Kernel::Portable {
             let task = Search::<ANY> { layout: self, query, nearest };
             // SAFETY: a layout's kernel is available.
             return unsafe { vector::dispatch(self.wide.kernel, task) };
         }
-        let boxed = self.boxed(query.ray);
         let visit = |block: &TriangleBlock, limit: &mut Hit| {
             let mut is_nearer = false;
             for (object, _) in block.triangles() {
@@ -258,7 +252,7 @@ impl DWideBvh {
             }
             is_nearer
         };
-        let hit = self.visit_portable::<ANY>(&boxed, visit);
+        let hit = self.visit_portable::<ANY>(query.ray, visit);
         self.resolve_alone(query.ray, nearest);
         !hit.is_miss()
     }
@@ -270,7 +264,7 @@ impl DWideBvh {
     #[inline(always)]
     pub(super) unsafe fn offer_block<K: Instructions>(
         &self,
-        query: Query,
+        query: &Query,
         nearest: &mut NearestHit,
         block: &TriangleBlock,
         bounded: &Bounded,
@@ -301,7 +295,8 @@ impl DWideBvh {
         let others = possible & !certain & used;
         if others != 0 {
             // SAFETY: as above.
-            is_nearer |= unsafe { K::call(InDoubles { query, nearest, block, possible: others }) };
+            is_nearer |=
+                unsafe { K::call(InDoubles { query: *query, nearest, block, possible: others }) };
         }
         is_nearer
     }
@@ -313,7 +308,7 @@ impl DWideBvh {
     #[inline(always)]
     pub(super) unsafe fn any_of<K: Instructions>(
         &self,
-        query: Query,
+        query: &Query,
         block: &TriangleBlock,
         Bounded { possible, certain, along, .. }: &Bounded,
     ) -> Option<u32> {
@@ -333,7 +328,7 @@ impl DWideBvh {
         let is_hit = others != 0
             && unsafe {
                 let nearest = &mut nearest;
-                K::call(InDoubles { query, nearest, block, possible: others })
+                K::call(InDoubles { query: *query, nearest, block, possible: others })
             };
         is_hit.then_some(nearest.object)
     }
@@ -342,15 +337,19 @@ impl DWideBvh {
 /// Returns a distance of the form in f32.
 #[inline(always)]
 pub(super) fn single(t: f64, unit: f64) -> f32 {
-    // The reciprocal of a power of two is exact.
-    let size = f64::from_bits(1.0f64.to_bits() * 2 - unit.to_bits());
-    ((t * size) as f32).min(f32::MAX)
+    ((t * inverse_of_unit(unit)) as f32).min(f32::MAX)
+}
+
+/// Returns the reciprocal of a power of two, exactly.
+#[inline(always)]
+fn inverse_of_unit(unit: f64) -> f64 {
+    f64::from_bits(1.0f64.to_bits() * 2 - unit.to_bits())
 }
 
 /// A search by a vector kernel.
 struct Search<'a, const ANY: bool> {
     layout: &'a DWideBvh,
-    query: Query<'a>,
+    query: &'a Query<'a>,
     nearest: &'a mut NearestHit,
 }
 
@@ -363,9 +362,9 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
         // SAFETY: the processor has the instructions.
         unsafe {
             let boxed = layout.boxed_by::<K::Block>(query.ray);
-            let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &layout.wide);
+            let leaf_ray = Lazy::new(&boxed, &layout.wide);
             let mut leaves = Candidates::<_, ANY> { layout, leaf_ray, query, nearest };
-            let hit = traverse::<K, ANY>(layout, &boxed, &mut leaves);
+            let hit = traverse::<K, ANY>(&layout.wide, &boxed, &mut leaves);
             if !ANY && !nearest.is_known() {
                 let triangle = &layout.triangles[nearest.object as usize];
                 match rounded_distance::<K::Block>(query.ray, triangle) {
@@ -374,30 +373,6 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
                 }
             }
             !hit.is_miss()
-        }
-    }
-}
-
-/// Visits the leaves that a ray enters.
-#[inline(always)]
-unsafe fn traverse<K: Instructions, const ANY: bool>(
-    layout: &DWideBvh,
-    boxed: &Boxed,
-    leaves: &mut impl Leaves<K>,
-) -> Hit {
-    let Boxed { ray, ends } = boxed;
-    let wide = &layout.wide;
-    let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
-    let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
-    let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
-    // SAFETY: the processor has the instructions; the stack has room for `stack_need` children and
-    // one register more.
-    unsafe {
-        if ray.begins_in(&wide.near) {
-            visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), leaves, base)
-        } else {
-            let far = FarRay::in_frame(*ends, &layout.frame, &wide.bounds);
-            visit::<K, ANY>(wide, ray.t_max(), &FarBoxRay::new(ray, &far), leaves, base)
         }
     }
 }
@@ -416,42 +391,48 @@ impl<K: Instructions> Task<K> for AllHits<'_> {
     unsafe fn run(self) {
         // SAFETY: the processor has the instructions.
         unsafe {
-            let boxed = self.layout.boxed_by::<K::Block>(self.ray);
-            let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &self.layout.wide);
             let layout = self.layout;
-            traverse::<K, ANY_HIT>(layout, &boxed, &mut AllCandidates { leaf_ray, hits: self });
+            let boxed = layout.boxed_by::<K::Block>(self.ray);
+            let leaf_ray = Lazy::new(&boxed, &layout.wide);
+            let mut leaves = AllCandidates { leaf_ray, hits: self };
+            traverse::<K, ANY_HIT>(&layout.wide, &boxed, &mut leaves);
         }
     }
 }
 
 /// Takes the triangles of a block that the ray crosses.
-struct AllCandidates<'a, L> {
-    leaf_ray: LeafRay<L>,
+struct AllCandidates<'a, 'r, L> {
+    leaf_ray: Lazy<'r, L>,
     hits: AllHits<'a>,
 }
 
-impl<K: Instructions> Leaves<K> for AllCandidates<'_, K::Block> {
+impl<K: Instructions> Leaves<K> for AllCandidates<'_, '_, K::Block> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, _: &mut Hit) -> bool {
         let AllHits { layout, ray, hits } = &mut self.hits;
         // SAFETY: the processor has the instructions.
         let possible = unsafe {
-            let corners = self.leaf_ray.corners(block);
-            self.leaf_ray.pairs.candidates(&corners).crossings.possible & block.used::<K::Block>()
+            let leaf_ray = self.leaf_ray.get::<K>();
+            let corners = leaf_ray.corners(block);
+            leaf_ray.pairs.candidates(&corners).crossings.possible & block.used::<K::Block>()
         };
         for lane in (0..TriangleBlock::LANES).filter(|lane| possible >> lane & 1 != 0) {
             hits.extend(layout.hit_of(ray, block.id(lane)));
         }
         false
     }
+
+    fn far_ray(&self, _: &WideBvh, _: &Ray) -> FarRay {
+        self.hits.layout.far_ray(self.hits.ray)
+    }
 }
 
 /// Passes the triangles of a block on that the ray may meet.
-struct Candidates<'a, 'n, L, const ANY: bool> {
+struct Candidates<'a, 'r, L, const ANY: bool> {
     layout: &'a DWideBvh,
-    leaf_ray: LeafRay<L>,
-    query: Query<'a>,
-    nearest: &'n mut NearestHit,
+    leaf_ray: Lazy<'r, L>,
+    query: &'a Query<'a>,
+    nearest: &'a mut NearestHit,
 }
 
 impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block, ANY> {
@@ -459,14 +440,15 @@ impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions.
         unsafe {
-            let corners = self.leaf_ray.corners(block);
-            let candidates = self.leaf_ray.pairs.candidates(&corners);
-            let (possible, certain) =
-                self.leaf_ray.pairs.within(&candidates, K::Block::splat(nearest.t));
+            let leaf_ray = self.leaf_ray.get::<K>();
+            let corners = leaf_ray.corners(block);
+            let pairs = &leaf_ray.pairs;
+            let candidates = pairs.candidates(&corners);
+            let (possible, certain) = pairs.within(&candidates, K::Block::splat(nearest.t));
             if possible == 0 {
                 return false;
             }
-            let ([low, high], along) = self.leaf_ray.pairs.distances(&candidates);
+            let ([low, high], along) = pairs.distances(&candidates);
             let mut bounded = Bounded { possible, certain, along, ..Bounded::zeroed() };
             if ANY {
                 let hit = self.layout.any_of::<K>(self.query, block, &bounded);
@@ -485,6 +467,10 @@ impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block
             }
             is_nearer
         }
+    }
+
+    fn far_ray(&self, _: &WideBvh, _: &Ray) -> FarRay {
+        self.layout.far_ray(self.query.ray)
     }
 }
 

@@ -294,14 +294,14 @@ impl<'a> Find for Nearest<'a> {
         let nearest = &mut self.nearest[number];
         // SAFETY: the processor has the instructions; the block is one of the layout.
         let is_nearer =
-            unsafe { self.part.layout.offer_block::<K>(query, nearest, block, bounded) };
+            unsafe { self.part.layout.offer_block::<K>(&query, nearest, block, bounded) };
         let t = single(nearest.high, nearest.unit);
         is_nearer.then_some(Hit { t, object: nearest.object })
     }
 
     fn alone(&mut self, _: &WideBvh, number: usize) {
         let query = self.part.query(number);
-        self.part.layout.search::<NEAREST_HIT>(query, &mut self.nearest[number]);
+        self.part.layout.search::<NEAREST_HIT>(&query, &mut self.nearest[number]);
     }
 }
 
@@ -336,7 +336,7 @@ impl<'a, const PLAIN: bool> Find for Any<'a, PLAIN> {
     ) -> Option<Hit> {
         let query = self.part.query(number);
         // SAFETY: the processor has the instructions; the block is one of the layout.
-        let hit = unsafe { self.part.layout.any_of::<K>(query, block, bounded) };
+        let hit = unsafe { self.part.layout.any_of::<K>(&query, block, bounded) };
         hit.map(|object| Hit { t: 0.0, object })
     }
 
@@ -348,7 +348,7 @@ impl<'a, const PLAIN: bool> Find for Any<'a, PLAIN> {
     fn alone(&mut self, _: &WideBvh, number: usize) {
         let query = self.part.query(number);
         let mut nearest = NearestHit::new(query.ray);
-        self.hits[number] = self.part.layout.search::<ANY_HIT>(query, &mut nearest);
+        self.hits[number] = self.part.layout.search::<ANY_HIT>(&query, &mut nearest);
     }
 }
 

@@ -185,9 +185,7 @@ pub(super) const RAYS: usize = 16;
 /// # Safety
 /// The processor has the instructions; there are `N` numbers at a place per lane.
 #[inline(always)]
-pub(super) unsafe fn gathered<D: DoubleLanes, const N: usize>(
-    from: &[*const f64; RAYS],
-) -> [D; N] {
+pub(super) unsafe fn gathered<D: DoubleLanes, const N: usize>(from: &[*const f64; RAYS]) -> [D; N] {
     // SAFETY: the processor has the instructions; so many numbers are there.
     unsafe {
         let mut numbers = [D::splat(0.0); N];
@@ -242,12 +240,8 @@ unsafe fn rounded<L: Lanes>(
     [a, b, c]: [Vector<L::Double>; 3],
 ) -> ([f64; RAYS], u32) {
     const { assert!(L::N <= RAYS) };
-    let [low, high] = distance(
-        difference(a, origin),
-        direction,
-        difference(b, a),
-        difference(c, a),
-    );
+    let [low, high] =
+        distance(difference(a, origin), direction, difference(b, a), difference(c, a));
     let mut distances = [0.0; RAYS];
     // SAFETY: there is room. Adding 0 turns −0 into +0.
     unsafe { (low + low.filled(0.0)).store(distances.as_mut_ptr()) };

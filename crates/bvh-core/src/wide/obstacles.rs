@@ -85,7 +85,7 @@ impl Obstacles for DWideBvh {
     }
 
     fn boxed(&self, ray: &DRay) -> Ray {
-        DWideBvh::boxed(self, ray).ray
+        DWideBvh::boxed(self, ray)
     }
 
     #[inline(always)]
