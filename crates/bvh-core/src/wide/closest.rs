@@ -3,7 +3,7 @@
 use super::answer::NEAREST_HIT;
 use super::box_ray::BoxTest;
 use super::double::DWideBvh;
-use super::double_block::DoubleBlock;
+use super::double_block::corners_of;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{DoubleLanes, Lanes, Mask};
@@ -200,9 +200,8 @@ impl Surface for DWideBvh {
 
     #[inline(always)]
     unsafe fn lanes<L: Lanes>(&self, block: &TriangleBlock) -> [Vector<L::Double>; 3] {
-        let block = DoubleBlock::new(block, &self.triangles);
         // SAFETY: the processor has the instructions.
-        unsafe { block.corners_along::<L>([0, 1, 2]) }
+        unsafe { corners_of::<L>(block, &self.triangles, block.used::<L>()) }
     }
 }
 

@@ -25,7 +25,7 @@
 //! R, and so k is at most S over that half.
 
 use super::answer::{ANY_HIT, Bounded, NEAREST_HIT};
-use super::double_block::{DoubleBlock, rounded_distance, splat};
+use super::double_block::{decide, rounded_distance, splat};
 use super::instructions::{Instructions, Task};
 use super::lanes::{DoubleLanes, Lanes};
 use super::layout::{WideBvh, WideNode};
@@ -192,9 +192,7 @@ impl DWideBvh {
     /// Returns the ray in the frame. Its direction has a largest component of about 1, so that f32
     /// has all distances within the scene.
     pub(super) fn boxed(&self, ray: &DRay) -> Ray {
-        let unit = ray.unit();
-        let range = [single(ray.t_min, unit), single(ray.t_max, unit)];
-        self.frame.ray_of(ray.scaled_ends(), range)
+        self.frame.ray_of(ray.scaled_ends(), [ray.single(ray.t_min), ray.single(ray.t_max)])
     }
 
     /// Returns the same, but for operations that are fused: an axis of the frame per lane.
@@ -204,7 +202,7 @@ impl DWideBvh {
     #[inline(always)]
     unsafe fn boxed_by<L: Lanes>(&self, ray: &DRay) -> Ray {
         const { assert!(L::N == 4) };
-        let unit = ray.unit();
+        let [size, unit] = ray.scales();
         let mut vectors = [Vec4::ZERO; 3];
         // SAFETY: the processor has the instructions; a vector has four numbers.
         unsafe {
@@ -214,10 +212,10 @@ impl DWideBvh {
             // The unit is found meanwhile.
             let along = self.turned::<L>(ray.direction);
             L::single(along * along.filled(unit)).store(direction);
-            L::single(along.filled(Frame::ABOVE * inverse_of_unit(unit)) / along).store(inverse);
+            L::single(along.filled(Frame::ABOVE * size) / along).store(inverse);
         }
         let [origin, direction, inverse] = vectors.map(Vec4::truncate);
-        let [t_min, t_max] = [single(ray.t_min, unit), single(ray.t_max, unit)];
+        let [t_min, t_max] = [ray.single(ray.t_min), ray.single(ray.t_max)];
         Ray::with_inverse(origin, direction, inverse, t_min, t_max)
     }
 
@@ -248,7 +246,7 @@ impl DWideBvh {
                 is_nearer |= query.offer(nearest, object);
             }
             if is_nearer {
-                *limit = Hit { t: single(nearest.high, nearest.unit), object: 0 };
+                *limit = Hit { t: query.ray.single(nearest.high), object: 0 };
             }
             is_nearer
         };
@@ -281,9 +279,7 @@ impl DWideBvh {
             if query.select.exclude.contains(&object) {
                 continue;
             }
-            let bounds =
-                (f64::from(low[lane]) * nearest.unit, f64::from(high[lane]) * nearest.unit);
-            let new = nearest.other(bounds, object);
+            let new = NearestHit::between(query.ray.doubles(low[lane], high[lane]), object);
             // It is certainly in the ray's range.
             if new.high < nearest.low {
                 *nearest = new;
@@ -332,18 +328,6 @@ impl DWideBvh {
             };
         is_hit.then_some(nearest.object)
     }
-}
-
-/// Returns a distance of the form in f32.
-#[inline(always)]
-pub(super) fn single(t: f64, unit: f64) -> f32 {
-    ((t * inverse_of_unit(unit)) as f32).min(f32::MAX)
-}
-
-/// Returns the reciprocal of a power of two, exactly.
-#[inline(always)]
-fn inverse_of_unit(unit: f64) -> f64 {
-    f64::from_bits(1.0f64.to_bits() * 2 - unit.to_bits())
 }
 
 /// A search by a vector kernel.
@@ -460,7 +444,7 @@ impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block
             let is_nearer = self.layout.offer_block::<K>(self.query, self.nearest, block, &bounded);
             if is_nearer {
                 let object = self.nearest.object;
-                let t = single(self.nearest.high, self.nearest.unit);
+                let t = self.query.ray.single(self.nearest.high);
                 *nearest = Hit { t, object };
                 let triangle = self.query.triangles.as_ptr().wrapping_add(object as usize);
                 K::prefetch_bytes(triangle.cast(), size_of::<DTriangle>());
@@ -490,13 +474,12 @@ impl<K: Instructions> Task<K> for InDoubles<'_, '_> {
     #[inline(always)]
     unsafe fn run(self) -> bool {
         let Self { query, nearest, block, possible } = self;
-        let doubles = DoubleBlock::new(block, query.triangles);
-        // SAFETY: the processor has the instructions.
-        let decided = unsafe { doubles.decide::<K::Block>(query.ray, possible) };
+        // SAFETY: the processor has the instructions; the block is one of the layout.
+        let decided = unsafe { decide::<K::Block>(query.ray, block, query.triangles, possible) };
         let mut is_nearer = false;
         for lane in (0..TriangleBlock::LANES).filter(|lane| decided.hits >> lane & 1 != 0) {
             let bounds = (decided.low[lane], decided.high[lane]);
-            is_nearer |= query.take(nearest, nearest.other(bounds, block.id(lane)));
+            is_nearer |= query.take(nearest, NearestHit::between(bounds, block.id(lane)));
         }
         for lane in (0..TriangleBlock::LANES).filter(|lane| decided.unsure >> lane & 1 != 0) {
             is_nearer |= query.offer(nearest, block.id(lane));

@@ -2,7 +2,7 @@
 //! distance of each ray's hit.
 
 use super::answer::{ANY_HIT, Bounded, Find, Known, NEAREST_HIT};
-use super::double::{DWideBvh, single};
+use super::double::DWideBvh;
 use super::double_block::{RAYS, gathered, rounded_distances};
 use super::instructions::{Instructions, Task};
 use super::lanes::{DoubleLanes, Lanes};
@@ -107,6 +107,9 @@ impl DWideBvh {
         }
     }
 }
+
+/// The bounds of a distance that is found at the end.
+const UNKNOWN: (f64, f64) = (0.0, f64::INFINITY);
 
 /// By how many rays the triangles that they hit are fetched ahead.
 const AHEAD: usize = 16;
@@ -227,7 +230,7 @@ impl Rays for DRays<'_> {
         // SAFETY: the processor has the instructions; the rays exist.
         unsafe {
             let rays = core::array::from_fn(ray);
-            let [x, y, z, dx, dy, dz, t_min, t_max] = gathered::<L::Double, 8>(&rays);
+            let [x, y, z, dx, dy, dz, t_min, t_max] = gathered::<L::Double, 8, RAYS>(&rays);
             let size = dx.abs().max(dy.abs()).max(dz.abs()).power_of_two();
             let unit = size.filled(1.0) / size;
             let along = [dx * unit, dy * unit, dz * unit];
@@ -272,15 +275,22 @@ impl<'a> Find for Nearest<'a> {
         let nearest = &mut self.nearest[number];
         // What is known of the same triangle already is more.
         if object != nearest.object {
-            let bounds = (f64::from(low) * nearest.unit, f64::from(high) * nearest.unit);
-            *nearest = nearest.other(bounds, object);
+            *nearest = NearestHit::between(self.part.rays[number].doubles(low, high), object);
         }
     }
 
     fn known(&self, number: usize) -> Known {
-        let NearestHit { low, high, unit, object } = self.nearest[number];
-        let (low, high) = (single(low, unit).next_down(), single(high, unit).next_up());
-        Known { low, high, object }
+        let NearestHit { low, high, object } = self.nearest[number];
+        let ray = &self.part.rays[number];
+        Known { low: ray.single(low).next_down(), high: ray.single(high).next_up(), object }
+    }
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, object: u32) {
+        let nearest = &mut self.nearest[number];
+        if object != nearest.object {
+            *nearest = NearestHit::between(UNKNOWN, object);
+        }
     }
 
     #[inline(always)]
@@ -295,8 +305,7 @@ impl<'a> Find for Nearest<'a> {
         // SAFETY: the processor has the instructions; the block is one of the layout.
         let is_nearer =
             unsafe { self.part.layout.offer_block::<K>(&query, nearest, block, bounded) };
-        let t = single(nearest.high, nearest.unit);
-        is_nearer.then_some(Hit { t, object: nearest.object })
+        is_nearer.then(|| Hit { t: query.ray.single(nearest.high), object: nearest.object })
     }
 
     fn alone(&mut self, _: &WideBvh, number: usize) {
@@ -362,9 +371,8 @@ struct All<'a> {
 
 impl All<'_> {
     fn take(&mut self, number: usize, hit: DHit) {
-        let (t, nearest) = (hit.t, NearestHit::new(&self.part.rays[number]));
         self.numbers.push(number);
-        self.found.push(nearest.other((t, t), hit.object));
+        self.found.push(NearestHit::between((hit.t, hit.t), hit.object));
     }
 }
 
@@ -396,10 +404,9 @@ impl<'a> Find for All<'a> {
                 let hit = layout.hit_of(ray, block.id(lane));
                 hit.into_iter().for_each(|hit| self.take(number, hit));
             } else {
-                // It crosses no edge, in the ray's range, at a distance that is not known yet.
-                let unknown = (0.0, f64::INFINITY);
+                // It crosses no edge, in the ray's range.
                 self.numbers.push(number);
-                self.found.push(NearestHit::new(ray).other(unknown, block.id(lane)));
+                self.found.push(NearestHit::between(UNKNOWN, block.id(lane)));
             }
         }
         None

@@ -6,16 +6,7 @@ use super::triangles::TriangleBlock;
 use crate::double::largest_axis;
 use crate::exact::{AXES, ERROR, Twice, distance};
 use crate::{DRay, DTriangle};
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
-
-/// The triangles of a [`TriangleBlock`] in f64.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct DoubleBlock {
-    /// `corners[corner][axis][lane]`.
-    corners: [[[f64; TriangleBlock::LANES]; 3]; 3],
-}
 
 /// What f64 decides about a ray and the triangles of a block.
 pub(super) struct Decided {
@@ -27,83 +18,84 @@ pub(super) struct Decided {
     pub(super) high: [f64; TriangleBlock::LANES],
 }
 
-impl DoubleBlock {
-    /// The triangles of a block, with the last one in unused lanes.
-    pub(super) fn new(block: &TriangleBlock, triangles: &[DTriangle]) -> Self {
-        let mut corners = [[[0.0; TriangleBlock::LANES]; 3]; 3];
-        let mut last = block.id(0);
-        for lane in 0..TriangleBlock::LANES {
-            last = if block.triangle(lane).is_some() { block.id(lane) } else { last };
-            for (axes, corner) in corners.iter_mut().zip(triangles[last as usize].0) {
-                (0..3).for_each(|axis| axes[axis][lane] = corner[axis]);
-            }
-        }
-        Self { corners }
-    }
+/// Returns the corners of the triangles in these `lanes` of a block, of which there is one, and of any
+/// of them in other lanes.
+///
+/// # Safety
+/// The processor has the instructions of `L`, which has four lanes; the triangles are those of the
+/// block.
+#[inline(always)]
+pub(super) unsafe fn corners_of<L: Lanes>(
+    block: &TriangleBlock,
+    triangles: &[DTriangle],
+    lanes: u32,
+) -> [Vector<L::Double>; 3] {
+    const { assert!(L::N == TriangleBlock::LANES) };
+    let any = lanes.trailing_zeros() as usize % TriangleBlock::LANES;
+    let triangle = |lane: usize| {
+        let object = block.id(if lanes >> lane & 1 != 0 { lane } else { any });
+        triangles.as_ptr().wrapping_add(object as usize).cast()
+    };
+    let triangles = [triangle(0), triangle(1), triangle(2), triangle(3)];
+    // SAFETY: the processor has the instructions; a triangle is nine numbers.
+    let [ax, ay, az, bx, by, bz, cx, cy, cz] = unsafe { gathered::<L::Double, 9, 4>(&triangles) };
+    [[ax, ay, az], [bx, by, bz], [cx, cy, cz]]
+}
 
-    /// Returns the corners of each triangle along these axes.
-    ///
-    /// # Safety
-    /// As [`decide`](Self::decide).
-    #[inline(always)]
-    pub(super) unsafe fn corners_along<L: Lanes>(&self, axes: [usize; 3]) -> [[L::Double; 3]; 3] {
-        let [a, b, c] = &self.corners;
-        // SAFETY: the processor has the instructions.
-        unsafe { [load::<L>(a, axes), load::<L>(b, axes), load::<L>(c, axes)] }
-    }
-
-    /// Decides about those of the `possible` triangles that f64 suffices for.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`, which has four lanes.
-    #[inline(always)]
-    pub(super) unsafe fn decide<L: Lanes>(&self, ray: &DRay, possible: u32) -> Decided {
-        const { assert!(L::N == TriangleBlock::LANES) };
-        let [i, j, k] = AXES[largest_axis(ray.direction)];
-        // SAFETY: the processor has the instructions; there are so many numbers.
-        unsafe {
-            let (origin, direction) = (ray.origin, ray.direction);
-            let origin = splat::<L>(DVec3::new(origin[i], origin[j], origin[k]));
-            let [dx, dy, dz] = splat::<L>(DVec3::new(direction[i], direction[j], direction[k]));
-            let [first, second, third] = [
-                load::<L>(&self.corners[0], [i, j, k]),
-                load::<L>(&self.corners[1], [i, j, k]),
-                load::<L>(&self.corners[2], [i, j, k]),
-            ];
-            let error = L::Double::splat(ERROR);
-            let zero = L::Double::splat(0.0);
-            // As in `Line::edges`.
-            let from = minus(first, origin);
-            let to_second = minus(second, origin);
-            let to_third = minus(third, origin);
-            let reach = largest(from).max(largest(to_second)).max(largest(to_third));
-            let [ax, ay] = sheared(from, [dx, dy, dz]);
-            let [bx, by] = sheared(to_second, [dx, dy, dz]);
-            let [cx, cy] = sheared(to_third, [dx, dy, dz]);
-            let spread = largest([ax, bx, cx]).max(largest([ay, by, cy]));
-            let coordinate_error = reach * dz.abs() * error;
-            let bound = coordinate_error * (spread + coordinate_error);
-            let u = cx * by - cy * bx;
-            let v = ax * cy - ay * cx;
-            let w = bx * ay - by * ax;
-            let least = u.min(v).min(w);
-            let most = u.max(v).max(w);
-            let below = zero - bound;
-            let is_inside = bound.lt(least) | most.lt(below);
-            let is_outside = least.lt(below) & bound.lt(most);
-            let sides = [minus(second, first), minus(third, first)];
-            let (t, slack, is_known) = plane(from, [dx, dy, dz], sides);
-            let low = t - slack;
-            let high = t + slack;
-            let hits = is_inside & is_known & zero.le(low);
-            let misses = is_outside | is_inside & is_known & high.lt(zero);
-            let hits = L::narrow(hits).bits() & possible;
-            let unsure = possible & !hits & !L::narrow(misses).bits();
-            let mut decided = Decided { hits, unsure, low: [0.0; 4], high: [0.0; 4] };
-            low.store(decided.low.as_mut_ptr());
-            high.store(decided.high.as_mut_ptr());
-            decided
-        }
+/// Decides about those of the `possible` triangles of a block that f64 suffices for. There is one.
+///
+/// # Safety
+/// As [`corners_of`].
+#[inline(always)]
+pub(super) unsafe fn decide<L: Lanes>(
+    ray: &DRay,
+    block: &TriangleBlock,
+    triangles: &[DTriangle],
+    possible: u32,
+) -> Decided {
+    let [i, j, k] = AXES[largest_axis(ray.direction)];
+    // SAFETY: the processor has the instructions; there are so many numbers.
+    unsafe {
+        let (origin, direction) = (ray.origin, ray.direction);
+        let origin = splat::<L>(DVec3::new(origin[i], origin[j], origin[k]));
+        let [dx, dy, dz] = splat::<L>(DVec3::new(direction[i], direction[j], direction[k]));
+        let [a, b, c] = corners_of::<L>(block, triangles, possible);
+        let first = [a[i], a[j], a[k]];
+        let second = [b[i], b[j], b[k]];
+        let third = [c[i], c[j], c[k]];
+        let error = L::Double::splat(ERROR);
+        let zero = L::Double::splat(0.0);
+        // As in `Line::edges`.
+        let from = minus(first, origin);
+        let to_second = minus(second, origin);
+        let to_third = minus(third, origin);
+        let reach = largest(from).max(largest(to_second)).max(largest(to_third));
+        let [ax, ay] = sheared(from, [dx, dy, dz]);
+        let [bx, by] = sheared(to_second, [dx, dy, dz]);
+        let [cx, cy] = sheared(to_third, [dx, dy, dz]);
+        let spread = largest([ax, bx, cx]).max(largest([ay, by, cy]));
+        let coordinate_error = reach * dz.abs() * error;
+        let bound = coordinate_error * (spread + coordinate_error);
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let least = u.min(v).min(w);
+        let most = u.max(v).max(w);
+        let below = zero - bound;
+        let is_inside = bound.lt(least) | most.lt(below);
+        let is_outside = least.lt(below) & bound.lt(most);
+        let sides = [minus(second, first), minus(third, first)];
+        let (t, slack, is_known) = plane(from, [dx, dy, dz], sides);
+        let low = t - slack;
+        let high = t + slack;
+        let hits = is_inside & is_known & zero.le(low);
+        let misses = is_outside | is_inside & is_known & high.lt(zero);
+        let hits = L::narrow(hits).bits() & possible;
+        let unsure = possible & !hits & !L::narrow(misses).bits();
+        let mut decided = Decided { hits, unsure, low: [0.0; 4], high: [0.0; 4] };
+        low.store(decided.low.as_mut_ptr());
+        high.store(decided.high.as_mut_ptr());
+        decided
     }
 }
 
@@ -116,21 +108,6 @@ pub(super) type Vector<D> = [D; 3];
 pub(super) unsafe fn splat<L: Lanes>(point: DVec3) -> Vector<L::Double> {
     // SAFETY: the processor has the instructions.
     unsafe { [L::Double::splat(point.x), L::Double::splat(point.y), L::Double::splat(point.z)] }
-}
-
-#[inline(always)]
-unsafe fn load<L: Lanes>(
-    axes: &[[f64; TriangleBlock::LANES]; 3],
-    [i, j, k]: [usize; 3],
-) -> Vector<L::Double> {
-    // SAFETY: the processor has the instructions; there are so many numbers.
-    unsafe {
-        [
-            L::Double::load(axes[i].as_ptr()),
-            L::Double::load(axes[j].as_ptr()),
-            L::Double::load(axes[k].as_ptr()),
-        ]
-    }
 }
 
 #[inline(always)]
@@ -185,7 +162,9 @@ pub(super) const RAYS: usize = 16;
 /// # Safety
 /// The processor has the instructions; there are `N` numbers at a place per lane.
 #[inline(always)]
-pub(super) unsafe fn gathered<D: DoubleLanes, const N: usize>(from: &[*const f64; RAYS]) -> [D; N] {
+pub(super) unsafe fn gathered<D: DoubleLanes, const N: usize, const P: usize>(
+    from: &[*const f64; P],
+) -> [D; N] {
     // SAFETY: the processor has the instructions; so many numbers are there.
     unsafe {
         let mut numbers = [D::splat(0.0); N];

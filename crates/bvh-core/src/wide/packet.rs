@@ -123,13 +123,6 @@ impl<K: Instructions> Packet<K> {
                 let vector = vector.assume_init_ref();
                 vector.nearest.t.store(distances.as_mut_ptr());
                 vector.nearest.object.store(objects.as_mut_ptr().cast());
-                if F::DECIDES && !F::ANY {
-                    let known = vector.nearest.known();
-                    for lane in 0..K::Rays::N {
-                        find.learn(vector.first + lane, known(lane));
-                    }
-                    continue;
-                }
                 vector.first
             };
             for (lane, (&t, &object)) in distances.iter().zip(&objects).enumerate().take(K::Rays::N)
