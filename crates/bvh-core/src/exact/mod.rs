@@ -231,7 +231,7 @@ impl Line {
         let [a, b, c] = triangle.map(P::double);
         let minus = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|i| Twice::difference(p[i], q[i]));
         let corner = minus(a, origin.double());
-        let [low, high] = distance(corner, direction.double(), minus(b, a), minus(c, a));
+        let [low, high] = distance(corner, direction.double(), minus(b, a), minus(c, a), None);
         if low == high {
             return low + 0.0;
         }

@@ -26,7 +26,8 @@
 //!
 //! Where m is greater, the slack exceeds a quarter of |c| and 2⁻⁵⁰|t₀|: the sums differ, unless all
 //! numbers are 0, when A · n is. Infinite numbers, of what overflows or of s = 0, make NaN of a sum.
-//! What underflows is below 2⁻⁸²⁰ / |s|, and N at least 2⁻⁶¹⁰, unless t₀ is 0, when nothing does.
+//! What underflows is below 2⁻⁸²⁰ / |s|, and N at least 2⁻⁶¹⁰, unless t₀ is 0, or has the few bits of
+//! bounds in f32, when nothing does.
 
 use crate::expansion::two_product;
 use core::ops::{Add, Div, Mul, Sub};
@@ -101,7 +102,7 @@ impl<D: Numbers> Twice<D> {
     fn beyond(self, t: D, d: D) -> Self {
         let (product, rest) = t.two_product(d);
         let Self(large, small) = Self::difference(self.0, product);
-        Self(large, (small - rest) + self.1)
+        Self(large, small + (self.1 - rest))
     }
 }
 
@@ -123,13 +124,15 @@ fn dot<D: Numbers>(a: [D; 3], b: [D; 3]) -> D {
 
 /// Returns two bounds of the distance A · n / d · n of the plane with the normal n = p × q: the corner
 /// A and the sides p, q, exactly, and the direction d, which is not parallel to the plane. If they
-/// are equal, that is the distance, rounded once.
+/// are equal, that is the distance, rounded once. What is `nearly` the distance, if that is known,
+/// is found no more.
 #[inline(always)]
 pub(crate) fn distance<D: Numbers>(
     [ax, ay, az]: [Twice<D>; 3],
     [dx, dy, dz]: [D; 3],
     [px, py, pz]: [Twice<D>; 3],
     [qx, qy, qz]: [Twice<D>; 3],
+    nearly: Option<D>,
 ) -> [D; 2] {
     let (x, x_size) = determinant(py, qz, pz, qy);
     let (y, y_size) = determinant(pz, qx, px, qz);
@@ -137,15 +140,20 @@ pub(crate) fn distance<D: Numbers>(
     let normal = [x.0, y.0, z.0];
     let sizes = [x_size, y_size, z_size];
     let inverse = dot([dx, dy, dz], normal).inverse();
-    let t = dot([ax.0, ay.0, az.0], normal) * inverse;
+    let t = match nearly {
+        Some(t) => t,
+        None => dot([ax.0, ay.0, az.0], normal) * inverse,
+    };
     let [px, py, pz] = [ax.beyond(t, dx), ay.beyond(t, dy), az.beyond(t, dz)];
     let (first, first_rest) = px.0.two_product(x.0);
     let (second, second_rest) = py.0.two_product(y.0);
     let (third, third_rest) = pz.0.two_product(z.0);
     let Twice(two, two_rest) = Twice::sum(first, second);
     let Twice(large, rest) = Twice::sum(two, third);
-    let small = dot(normal, [px.1, py.1, pz.1]) + dot([x.1, y.1, z.1], [px.0, py.0, pz.0]);
-    let small = (two_rest + rest) + ((first_rest + second_rest) + (third_rest + small));
+    // What is known first is added first.
+    let small = dot([x.1, y.1, z.1], [px.0, py.0, pz.0]);
+    let small = x.0.mul_add(px.1, y.0.mul_add(py.1, z.0.mul_add(pz.1, small)));
+    let small = ((two_rest + rest) + (first_rest + second_rest + third_rest)) + small;
     let change = (large + small) * inverse;
     let inverse = inverse.abs();
     let height = dot([ax.0.abs(), ay.0.abs(), az.0.abs()], sizes) * inverse;

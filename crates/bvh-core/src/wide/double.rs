@@ -351,7 +351,7 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
             let hit = traverse::<K, ANY>(&layout.wide, &boxed, &mut leaves);
             if !ANY && !nearest.is_known() {
                 let triangle = &layout.triangles[nearest.object as usize];
-                match rounded_distance::<K::Block>(query.ray, triangle) {
+                match rounded_distance::<K::Block>(query.ray, triangle, nearest) {
                     Some(t) => (nearest.low, nearest.high) = (t, t),
                     None => layout.resolve_alone(query.ray, nearest),
                 }

@@ -3,7 +3,7 @@
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::triangles::TriangleBlock;
-use crate::double::largest_axis;
+use crate::double::{NearestHit, largest_axis};
 use crate::exact::{AXES, ERROR, Twice, distance};
 use crate::{DRay, DTriangle};
 use glam::DVec3;
@@ -193,21 +193,28 @@ pub(super) unsafe fn rounded_distances<L: Lanes>(
         let [x, y, z, dx, dy, dz] = gathered(&rays.map(|ray| ray.cast()));
         let [ax, ay, az, bx, by, bz, cx, cy, cz] =
             gathered(&triangles.map(|triangle| triangle.cast()));
-        rounded::<L>([x, y, z], [dx, dy, dz], [[ax, ay, az], [bx, by, bz], [cx, cy, cz]])
+        rounded::<L>([x, y, z], [dx, dy, dz], [[ax, ay, az], [bx, by, bz], [cx, cy, cz]], None)
     }
 }
 
-/// Returns the rounded distance of one hit, if it is decided.
+/// Returns the rounded distance of one hit, if it is decided, by its bounds in f32: what this takes is
+/// not the work, but the waiting for one result after the other, the first of which these are.
 ///
 /// # Safety
 /// The processor has the instructions of `L`.
 #[inline(always)]
-pub(super) unsafe fn rounded_distance<L: Lanes>(ray: &DRay, triangle: &DTriangle) -> Option<f64> {
+pub(super) unsafe fn rounded_distance<L: Lanes>(
+    ray: &DRay,
+    triangle: &DTriangle,
+    hit: &NearestHit,
+) -> Option<f64> {
     let DTriangle([a, b, c]) = *triangle;
     // SAFETY: the processor has the instructions.
     let (distances, is_decided) = unsafe {
         let [origin, direction] = [splat::<L>(ray.origin), splat::<L>(ray.direction)];
-        rounded::<L>(origin, direction, [splat::<L>(a), splat::<L>(b), splat::<L>(c)])
+        let nearly = L::Double::splat(0.5 * (hit.low + hit.high));
+        let corners = [splat::<L>(a), splat::<L>(b), splat::<L>(c)];
+        rounded::<L>(origin, direction, corners, Some(nearly))
     };
     (is_decided & 1 != 0).then_some(distances[0])
 }
@@ -217,10 +224,11 @@ unsafe fn rounded<L: Lanes>(
     origin: Vector<L::Double>,
     direction: Vector<L::Double>,
     [a, b, c]: [Vector<L::Double>; 3],
+    nearly: Option<L::Double>,
 ) -> ([f64; RAYS], u32) {
     const { assert!(L::N <= RAYS) };
     let [low, high] =
-        distance(difference(a, origin), direction, difference(b, a), difference(c, a));
+        distance(difference(a, origin), direction, difference(b, a), difference(c, a), nearly);
     let mut distances = [0.0; RAYS];
     // SAFETY: there is room. Adding 0 turns −0 into +0.
     unsafe { (low + low.filled(0.0)).store(distances.as_mut_ptr()) };
