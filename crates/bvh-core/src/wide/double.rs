@@ -35,8 +35,8 @@ use super::{build, portable, vector};
 use crate::double::{NearestHit, Query};
 use crate::slabs::FarRay;
 use crate::{
-    Aabb, Bvh, DHit, DRay, DTriangle, Frame, Hit, InFrame, InvalidBvh, Kernel, Ray, Select, Slabs,
-    Triangle, validate_references,
+    Aabb, Bvh, DHit, DRay, DTriangle, Frame, Hit, InFrame, InvalidBvh, Kernel, Orientation, Ray,
+    Select, Slabs, Triangle, validate_references,
 };
 use bytemuck::Zeroable;
 use glam::{DMat3, DVec3, Vec4};
@@ -125,15 +125,35 @@ impl DWideBvh {
 
     /// Returns the nearest triangle that `ray` meets in its range, among those that count. Of several
     /// at the same distance, the one with the lowest id is nearest.
+    #[inline]
     pub fn nearest_hit(&self, ray: &DRay, select: Select) -> Option<DHit> {
-        let mut nearest = NearestHit::new(ray);
-        self.search::<NEAREST_HIT>(&self.query(ray, select), &mut nearest);
-        nearest.hit()
+        self.nearest_hit_of(ray, select.orientation, select.exclude)
     }
 
     /// Returns whether `ray` meets any triangle that counts in its range.
+    #[inline]
     pub fn any_hit(&self, ray: &DRay, select: Select) -> bool {
-        self.search::<ANY_HIT>(&self.query(ray, select), &mut NearestHit::new(ray))
+        self.any_hit_of(ray, select.orientation, select.exclude)
+    }
+
+    // By numbers in registers: a load of two that were just written would wait until they have
+    // reached the cache.
+
+    fn nearest_hit_of(
+        &self,
+        ray: &DRay,
+        orientation: Orientation,
+        exclude: &[u32],
+    ) -> Option<DHit> {
+        let mut nearest = NearestHit::new(ray);
+        let query = self.query(ray, Select { orientation, exclude });
+        self.search::<NEAREST_HIT>(&query, &mut nearest);
+        nearest.hit()
+    }
+
+    fn any_hit_of(&self, ray: &DRay, orientation: Orientation, exclude: &[u32]) -> bool {
+        let query = self.query(ray, Select { orientation, exclude });
+        self.search::<ANY_HIT>(&query, &mut NearestHit::new(ray))
     }
 
     /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest first;
@@ -234,12 +254,18 @@ impl DWideBvh {
     }
 
     /// Finds the nearest hit that counts, or with `ANY` any. Returns whether there is one.
+    #[inline]
     pub(super) fn search<const ANY: bool>(&self, query: &Query, nearest: &mut NearestHit) -> bool {
         if self.wide.kernel != Kernel::Portable {
             let task = Search::<ANY> { layout: self, query, nearest };
             // SAFETY: a layout's kernel is available.
             return unsafe { vector::dispatch(self.wide.kernel, task) };
         }
+        self.search_portable::<ANY>(query, nearest)
+    }
+
+    #[inline(never)]
+    fn search_portable<const ANY: bool>(&self, query: &Query, nearest: &mut NearestHit) -> bool {
         let visit = |block: &TriangleBlock, limit: &mut Hit| {
             let mut is_nearer = false;
             for (object, _) in block.triangles() {
@@ -255,7 +281,8 @@ impl DWideBvh {
         !hit.is_miss()
     }
 
-    /// Takes those triangles of a block that are nearer. Returns whether there are any.
+    /// Takes those triangles of a block that are nearer. Returns the ray's new end in f32, if there
+    /// are any.
     ///
     /// # Safety
     /// The processor has the instructions of `K`; the block is one of the layout.
@@ -266,11 +293,11 @@ impl DWideBvh {
         nearest: &mut NearestHit,
         block: &TriangleBlock,
         bounded: &Bounded,
-    ) -> bool {
+    ) -> Option<f32> {
         let Bounded { low, high, possible, certain, along } = *bounded;
         // SAFETY: the processor has the instructions.
         let used = unsafe { block.used::<K::Block>() };
-        let mut is_nearer = false;
+        let mut end = None;
         let mut lanes = query.select.oriented(certain & used, along);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize & 3;
@@ -283,18 +310,20 @@ impl DWideBvh {
             // It is certainly in the ray's range.
             if new.high < nearest.low {
                 *nearest = new;
-                is_nearer = true;
-            } else if new.low <= nearest.high {
-                is_nearer |= query.take_close(nearest, new);
+                end = Some(high[lane]);
+            } else if new.low <= nearest.high && query.take_close(nearest, new) {
+                end = Some(query.ray.single(nearest.high));
             }
         }
         let others = possible & !certain & used;
         if others != 0 {
+            let doubles = InDoubles { query: *query, nearest, block, possible: others };
             // SAFETY: as above.
-            is_nearer |=
-                unsafe { K::call(InDoubles { query: *query, nearest, block, possible: others }) };
+            if unsafe { K::call(doubles) } {
+                end = Some(query.ray.single(nearest.high));
+            }
         }
-        is_nearer
+        end
     }
 
     /// Returns a triangle of a block that the ray hits, if there is one.
@@ -441,15 +470,14 @@ impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block
             }
             low.store(bounded.low.as_mut_ptr());
             high.store(bounded.high.as_mut_ptr());
-            let is_nearer = self.layout.offer_block::<K>(self.query, self.nearest, block, &bounded);
-            if is_nearer {
+            let end = self.layout.offer_block::<K>(self.query, self.nearest, block, &bounded);
+            if let Some(t) = end {
                 let object = self.nearest.object;
-                let t = self.query.ray.single(self.nearest.high);
                 *nearest = Hit { t, object };
                 let triangle = self.query.triangles.as_ptr().wrapping_add(object as usize);
                 K::prefetch_bytes(triangle.cast(), size_of::<DTriangle>());
             }
-            is_nearer
+            end.is_some()
         }
     }
 

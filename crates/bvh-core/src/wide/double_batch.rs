@@ -303,9 +303,8 @@ impl<'a> Find for Nearest<'a> {
         let query = self.part.query(number);
         let nearest = &mut self.nearest[number];
         // SAFETY: the processor has the instructions; the block is one of the layout.
-        let is_nearer =
-            unsafe { self.part.layout.offer_block::<K>(&query, nearest, block, bounded) };
-        is_nearer.then(|| Hit { t: query.ray.single(nearest.high), object: nearest.object })
+        let end = unsafe { self.part.layout.offer_block::<K>(&query, nearest, block, bounded) };
+        end.map(|t| Hit { t, object: nearest.object })
     }
 
     fn alone(&mut self, _: &WideBvh, number: usize) {

@@ -29,6 +29,9 @@ pub(super) unsafe fn bound<K: Instructions, F: Find>(
             let corners = block.splat_corners::<K::Rays>(lane, vector.axes);
             let mut candidates = pairs.candidates(&corners);
             candidates.crossings.possible &= entered;
+            if candidates.crossings.possible == 0 {
+                continue;
+            }
             let nearest = &mut vector.nearest;
             let (possible, certain) = pairs.within(&candidates, nearest.t);
             if possible == 0 {
