@@ -26,7 +26,7 @@ impl From<[[f64; 3]; 3]> for DTriangle {
 
 /// The points `origin + t · direction` with `t_min <= t <= t_max`, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
-// In this order vector kernels load it; no register of four numbers then crosses a line of the cache.
+// Vector kernels load the numbers in this order, none of them across a line of the cache.
 #[repr(C, align(32))]
 pub struct DRay {
     pub(crate) origin: DVec3,

@@ -124,8 +124,8 @@ fn dot<D: Numbers>(a: [D; 3], b: [D; 3]) -> D {
 
 /// Returns two bounds of the distance A · n / d · n of the plane with the normal n = p × q: the corner
 /// A and the sides p, q, exactly, and the direction d, which is not parallel to the plane. If they
-/// are equal, that is the distance, rounded once. What is `nearly` the distance, if that is known,
-/// is found no more.
+/// are equal, that is the distance, rounded once. `nearly` is a number close to it, if one is known
+/// already.
 #[inline(always)]
 pub(crate) fn distance<D: Numbers>(
     [ax, ay, az]: [Twice<D>; 3],

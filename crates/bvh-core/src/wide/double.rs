@@ -29,7 +29,7 @@ use super::double_block::{decide, rounded_distance, splat};
 use super::instructions::{Instructions, Task};
 use super::lanes::{DoubleLanes, Lanes};
 use super::layout::{WideBvh, WideNode};
-use super::one_ray::{Lazy, Leaves, traverse};
+use super::one_ray::{DeferredRay, Leaves, traverse};
 use super::triangles::TriangleBlock;
 use super::{build, portable, vector};
 use crate::double::{NearestHit, Query};
@@ -375,7 +375,7 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
         // SAFETY: the processor has the instructions.
         unsafe {
             let boxed = layout.boxed_by::<K::Block>(query.ray);
-            let leaf_ray = Lazy::new(&boxed, &layout.wide);
+            let leaf_ray = DeferredRay::new(&boxed, &layout.wide);
             let mut leaves = Candidates::<_, ANY> { layout, leaf_ray, query, nearest };
             let hit = traverse::<K, ANY>(&layout.wide, &boxed, &mut leaves);
             if !ANY && !nearest.is_known() {
@@ -406,7 +406,7 @@ impl<K: Instructions> Task<K> for AllHits<'_> {
         unsafe {
             let layout = self.layout;
             let boxed = layout.boxed_by::<K::Block>(self.ray);
-            let leaf_ray = Lazy::new(&boxed, &layout.wide);
+            let leaf_ray = DeferredRay::new(&boxed, &layout.wide);
             let mut leaves = AllCandidates { leaf_ray, hits: self };
             traverse::<K, ANY_HIT>(&layout.wide, &boxed, &mut leaves);
         }
@@ -415,7 +415,7 @@ impl<K: Instructions> Task<K> for AllHits<'_> {
 
 /// Takes the triangles of a block that the ray crosses.
 struct AllCandidates<'a, 'r, L> {
-    leaf_ray: Lazy<'r, L>,
+    leaf_ray: DeferredRay<'r, L>,
     hits: AllHits<'a>,
 }
 
@@ -443,7 +443,7 @@ impl<K: Instructions> Leaves<K> for AllCandidates<'_, '_, K::Block> {
 /// Passes the triangles of a block on that the ray may meet.
 struct Candidates<'a, 'r, L, const ANY: bool> {
     layout: &'a DWideBvh,
-    leaf_ray: Lazy<'r, L>,
+    leaf_ray: DeferredRay<'r, L>,
     query: &'a Query<'a>,
     nearest: &'a mut NearestHit,
 }

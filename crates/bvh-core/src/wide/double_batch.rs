@@ -127,7 +127,7 @@ impl<K: Instructions> Task<K> for Resolve<'_> {
     #[inline(always)]
     unsafe fn run(self) {
         let Self { layout, rays, nearest } = self;
-        let triangle = |object: u32| layout.triangles.as_ptr().wrapping_add(object as usize);
+        let last = layout.triangles.len().saturating_sub(1);
         // Lanes without a hit have others of these.
         let mut their_rays = [rays.as_ptr(); RAYS];
         let mut their_triangles = [layout.triangles.as_ptr(); RAYS];
@@ -135,14 +135,15 @@ impl<K: Instructions> Task<K> for Resolve<'_> {
         let mut count = 0;
         for number in 0..nearest.len() {
             if let Some(ahead) = nearest.get(number + AHEAD) {
-                let triangle = triangle(ahead.object).cast();
+                let object = last.min(ahead.object as usize);
+                let triangle = layout.triangles.as_ptr().wrapping_add(object);
                 // SAFETY: the processor has the instructions; a prefetch may name any address.
-                unsafe { K::prefetch_bytes(triangle, size_of::<DTriangle>()) };
+                unsafe { K::prefetch_bytes(triangle.cast(), size_of::<DTriangle>()) };
             }
             let hit = nearest[number];
             if !hit.is_known() {
                 their_rays[count] = &rays[number];
-                their_triangles[count] = triangle(hit.object);
+                their_triangles[count] = &layout.triangles[hit.object as usize];
                 numbers[count] = number;
                 count += 1;
             }

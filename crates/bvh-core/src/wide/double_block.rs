@@ -197,8 +197,8 @@ pub(super) unsafe fn rounded_distances<L: Lanes>(
     }
 }
 
-/// Returns the rounded distance of one hit, if it is decided, by its bounds in f32: what this takes is
-/// not the work, but the waiting for one result after the other, the first of which these are.
+/// Returns the rounded distance of one hit, if it is decided. The time is that of a chain of dependent
+/// operations, which is shorter from the bounds that the hit has already.
 ///
 /// # Safety
 /// The processor has the instructions of `L`.

@@ -27,7 +27,7 @@ impl<K: Instructions, F: Filter, const ANY: bool> Task<K> for OneRay<'_, F, ANY>
     #[inline(always)]
     unsafe fn run(self) -> Hit {
         let Self { wide, ray, filter } = self;
-        let mut leaves = FirstHits::<_, _, ANY> { leaf_ray: Lazy::new(ray, wide), filter };
+        let mut leaves = FirstHits::<_, _, ANY> { leaf_ray: DeferredRay::new(ray, wide), filter };
         // SAFETY: the processor has the instructions of `K`.
         unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) }
     }
@@ -195,7 +195,7 @@ pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
 
 /// Keeps the nearest hit among those that `filter` accepts.
 struct FirstHits<'r, L, F, const ANY: bool> {
-    leaf_ray: Lazy<'r, L>,
+    leaf_ray: DeferredRay<'r, L>,
     filter: F,
 }
 
@@ -248,14 +248,14 @@ impl<K: Instructions, F: Filter, const ANY: bool> Leaves<K> for FirstHits<'_, K:
 }
 
 /// A ray that is prepared for triangles before the first of them: most rays in the open meet none.
-pub(crate) struct Lazy<'r, L> {
+pub(crate) struct DeferredRay<'r, L> {
     ray: &'r Ray,
     wide: &'r WideBvh,
     leaf_ray: MaybeUninit<LeafRay<L>>,
     is_prepared: bool,
 }
 
-impl<'r, L: Lanes> Lazy<'r, L> {
+impl<'r, L: Lanes> DeferredRay<'r, L> {
     #[inline(always)]
     pub(crate) fn new(ray: &'r Ray, wide: &'r WideBvh) -> Self {
         Self { ray, wide, leaf_ray: MaybeUninit::uninit(), is_prepared: false }
