@@ -27,6 +27,8 @@ impl From<[[f64; 3]; 3]> for DTriangle {
 
 /// The points `origin + t · direction` with `t_min <= t <= t_max`, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
+// Vector kernels load the numbers in this order, none of them across a line of the cache.
+#[repr(C, align(32))]
 pub struct DRay {
     pub(crate) origin: DVec3,
     pub(crate) direction: DVec3,
@@ -156,17 +158,41 @@ impl DRay {
         self.t_max
     }
 
-    /// The reciprocal of the power of two in the direction's largest component, exactly: the
-    /// factor to distances from those of a ray whose direction has about the length 1.
+    /// Returns the power of two in the direction's largest component, and its reciprocal: the factors
+    /// from distances to those of a ray whose direction has about the length 1, and back.
     #[inline(always)]
-    pub(crate) fn unit(&self) -> f64 {
-        const BIAS: u64 = 1023;
-        let exponent = self.direction.abs().max_element().to_bits() >> 52;
-        f64::from_bits((2 * BIAS - exponent) << 52)
+    pub(crate) fn scales(&self) -> [f64; 2] {
+        let size = self.direction.abs().max_element().to_bits() & f64::INFINITY.to_bits();
+        [size, 2 * 1.0f64.to_bits() - size].map(f64::from_bits)
+    }
+
+    /// Returns a distance in f32, for the direction scaled so that its largest component is about 1.
+    #[inline(always)]
+    pub(crate) fn single(&self, t: f64) -> f32 {
+        let [size, _] = self.scales();
+        ((t * size) as f32).min(f32::MAX)
+    }
+
+    /// Returns bounds of a distance from those of it in f32.
+    #[inline(always)]
+    pub(crate) fn doubles(&self, low: f32, high: f32) -> (f64, f64) {
+        let [_, unit] = self.scales();
+        (f64::from(low) * unit, f64::from(high) * unit)
+    }
+
+    /// Returns the origin, and the direction, scaled so that its largest component is about 1.
+    pub(crate) fn scaled_ends(&self) -> [DVec3; 2] {
+        let [_, unit] = self.scales();
+        [self.origin, self.direction * unit]
     }
 
     fn line(&self) -> Line {
         Line::new(self.origin, self.direction)
+    }
+
+    /// Returns the distance of the plane of a triangle that the ray's line crosses, rounded once.
+    fn rounded(&self, corners: &[DVec3; 3]) -> f64 {
+        Line::rounded([self.origin, self.direction], corners)
     }
 }
 
@@ -300,7 +326,7 @@ impl DTriangle {
         let line = ray.line();
         let t = match line.filter(&self.0) {
             // It crosses, and twice f64 nearly always rounds its distance.
-            Verdict::Between(..) => line.rounded(&self.0),
+            Verdict::Between(..) => ray.rounded(&self.0),
             _ => line.crossing(&self.0, is_moved)?,
         };
         (ray.t_min <= t && t <= ray.t_max).then_some(t)
@@ -319,8 +345,6 @@ pub(crate) struct NearestHit {
     pub(crate) low: f64,
     /// The distance beyond which nothing counts, or more.
     pub(crate) high: f64,
-    /// The ray's [unit](DRay::unit).
-    pub(crate) unit: f64,
     /// The triangle's id; the greatest number without a hit.
     pub(crate) object: u32,
 }
@@ -328,13 +352,13 @@ pub(crate) struct NearestHit {
 impl NearestHit {
     pub(crate) fn new(ray: &DRay) -> Self {
         let [low, high] = [ray.t_max; 2];
-        Self { low, high, unit: ray.unit(), object: u32::MAX }
+        Self { low, high, object: u32::MAX }
     }
 
-    /// Returns a hit of the same ray.
+    /// Returns a hit between bounds of its distance.
     #[inline(always)]
-    pub(crate) fn other(&self, (low, high): (f64, f64), object: u32) -> Self {
-        Self { low, high, object, ..*self }
+    pub(crate) fn between((low, high): (f64, f64), object: u32) -> Self {
+        Self { low, high, object }
     }
 
     pub(crate) fn is_known(&self) -> bool {
@@ -365,7 +389,7 @@ impl Query<'_> {
     /// Takes a triangle, decided by itself. Returns whether it is the new nearest hit.
     pub(crate) fn offer(&self, nearest: &mut NearestHit, object: u32) -> bool {
         let Some(bounds) = self.bounds(object) else { return false };
-        self.take(nearest, nearest.other(bounds, object))
+        self.take(nearest, NearestHit::between(bounds, object))
     }
 
     /// Takes a hit, if it counts and is nearer. Returns whether it is.
@@ -389,6 +413,10 @@ impl Query<'_> {
     #[cold]
     #[inline(never)]
     pub(crate) fn take_close(&self, nearest: &mut NearestHit, mut new: NearestHit) -> bool {
+        // A divided triangle is in several leaves.
+        if new.object == nearest.object {
+            return false;
+        }
         for narrow in [Self::narrow, Self::resolve] {
             for hit in [&mut new, &mut *nearest] {
                 if !hit.is_known() {
@@ -426,7 +454,7 @@ impl Query<'_> {
     /// Finds the rounded distance.
     pub(crate) fn resolve(&self, hit: &mut NearestHit) {
         let DTriangle(corners) = &self.triangles[hit.object as usize];
-        hit.low = self.ray.line().rounded(corners);
+        hit.low = self.ray.rounded(corners);
         hit.high = hit.low;
     }
 

@@ -60,7 +60,7 @@
 //!
 //! or, without third powers, 1 − u + 8u² ≤ i D ≤ 1 + u + 12u². Rounding to the nearest number keeps
 //! a factor between 1 − u + u² and 1 + u − u². The number that is rounded is therefore 10u² greater
-//! than 1 / D, where 7u² to 13u² would do; three operations in f64 add less than u² / 4.
+//! than 1 / D, where 7u² to 13u² would do; six operations in f64 add less than u² / 4.
 //!
 //! *Far.* Other rays are tested in f64. By 4ε for the origin and 9ε for the direction they are off
 //! by less than 2⁻⁴⁸ (M + S) with the largest M, by which their origins are moved as above.

@@ -85,7 +85,7 @@ mod volumes;
 
 use glam::DVec3;
 pub(crate) use number::{Number, Point};
-pub(crate) use quotient::{NARROWER, Numbers, Twice, distance};
+pub(crate) use quotient::{Numbers, Twice, distance};
 use volumes::Volumes;
 
 /// The axes of the shear, indexed by the axis of the direction's largest component.
@@ -232,23 +232,19 @@ impl Line {
     /// Returns the distance of the plane of a triangle that the line crosses at or in front of the
     /// origin, rounded once.
     #[inline(never)]
-    pub(crate) fn rounded<P: Point<Number = f64>>(&self, triangle: &[P; 3]) -> f64 {
-        let verdict = self.plane(&self.relative(triangle)[0], triangle);
-        let mut nearly = 0.0;
-        if let Verdict::Between(lowest, highest) = verdict {
-            let [a, b, c] = triangle.map(P::double);
-            let minus = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|i| Twice::difference(p[i], q[i]));
-            let [origin, direction] = self.ends();
-            let corner = minus(a, origin);
-            let Twice(high, low) = distance(&corner, &direction, &minus(b, a), &minus(c, a));
-            let slack = (highest - lowest) * NARROWER;
-            nearly = high + (low + slack);
-            if high + (low - slack) == nearly {
-                return nearly + 0.0;
-            }
+    pub(crate) fn rounded<P: Point<Number = f64>>(
+        [origin, direction]: [P; 2],
+        triangle: &[P; 3],
+    ) -> f64 {
+        let [a, b, c] = triangle.map(P::double);
+        let minus = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|i| Twice::difference(p[i], q[i]));
+        let corner = minus(a, origin.double());
+        let [low, high] = distance(corner, direction.double(), minus(b, a), minus(c, a), None);
+        if low == high {
+            return low + 0.0;
         }
-        let volumes = Volumes::new(self, triangle);
-        volumes.and_then(|volumes| volumes.rounded_distance()).unwrap_or(nearly)
+        let volumes = Volumes::new(&Self::new(origin, direction), triangle);
+        volumes.and_then(|volumes| volumes.rounded_distance()).unwrap_or(high)
     }
 
     /// Returns the rounded distance at which the ray's line crosses the triangle at or in front of

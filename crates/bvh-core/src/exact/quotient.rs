@@ -1,24 +1,36 @@
-//! Distances in twice the precision of f64: every value is the sum of two numbers.
+//! Distances in twice the precision of f64: what a distance in f64 lacks is found from the distance
+//! of its point to the plane.
 //!
-//! Differences of coordinates, products of two numbers and their rounding errors are exact; only sums
-//! of the small parts are rounded (compensated sums: Ogita, Rump & Oishi 2005, 'Accurate sum and dot
-//! product').
+//! ```text
+//!   t₀ ≈ A · n / d · n,      t = t₀ + n · P / d · n,      P = A − t₀ d
+//! ```
+//!
+//! holds for any t₀. Differences of coordinates, products of two numbers and their rounding errors
+//! are exact; only sums of the small parts are rounded (compensated sums: Ogita, Rump & Oishi 2005,
+//! 'Accurate sum and dot product').
 //!
 //! # The bound
 //!
 //! With ε = 2⁻⁵³, N and M of [`exact`](crate::exact): the small parts of a product of two differences
 //! are below 4ε of it, and their roundings below 8ε². A component of the normal is off by less than
-//! 20ε² of the sum of its absolute products, and its small part is below 5ε of it. In A · n, the small
-//! parts are together below 9εN, and their roundings, with those of n, below 120ε²N; in d · n, below
-//! 100ε²M. Both are normalised, so that the quotient adds a few ε²|t|. The distance is off by less
-//! than (120ε²N + 100ε²|t|M) / |d · n| · 8/7 and these, which is less than 512ε² (N + |t|M) / |d · n|:
-//! 2⁻⁴⁸ times the bound in f64.
+//! 20ε² of the sum of its absolute products, and its small part is below 5ε of it. A component of P
+//! is off by less than 4.1ε² of |A| + |t₀ d|, and its small part is below 2.1ε of that. In n · P, the
+//! product of two small parts is left out, and the other small parts, together below 10.3ε (N +
+//! |t₀|M), are rounded at most eight times: it is off by less than 118ε² (N + |t₀|M), and ε of itself.
+//!
+//! The computed s of d · n is off by less than 8.2εM. Let m = M / |s|, and c what is computed for
+//! n · P / d · n. Where 8.3εm is at most 1/4, c is off by less than 3.4ε|c| from roundings, by 11.2εm|c|
+//! from s, and by 160ε² (N + |t₀|M) / |s| from n · P, with s. As m is at least nearly 1, the slack
+//! 512ε² (N + |t₀|M) / |s| + 32εm|c| covers these, and the rounding of c plus or minus the slack. If
+//! both sums with t₀ round to one number, that is the rounded distance, because rounding is monotone.
+//!
+//! Where m is greater, the slack exceeds a quarter of |c| and 2⁻⁵⁰|t₀|: the sums differ, unless all
+//! numbers are 0, when A · n is. Infinite numbers, of what overflows or of s = 0, make NaN of a sum.
+//! What underflows is below 2⁻⁸²⁰ / |s|, and N at least 2⁻⁶¹⁰, unless t₀ is 0, or has the few bits of
+//! bounds in f32, when nothing does.
 
 use super::expansion::two_product;
 use core::ops::{Add, Div, Mul, Sub};
-
-/// The factor from bounds in f64 to bounds here.
-pub(crate) const NARROWER: f64 = 1.0 / (1_u64 << 48) as f64;
 
 /// A number, or several side by side.
 pub(crate) trait Numbers:
@@ -26,17 +38,45 @@ pub(crate) trait Numbers:
 {
     /// The rounded product and its rounding error.
     fn two_product(self, other: Self) -> (Self, Self);
+
+    /// `self · factor + term`, rounded once or twice.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+
+    /// One over the number, off by at most 1.2ε of it.
+    fn inverse(self) -> Self;
+
+    /// The size.
+    fn abs(self) -> Self;
+
+    /// The same number wherever there is one in `self`.
+    fn filled(self, x: f64) -> Self;
 }
 
 impl Numbers for f64 {
     fn two_product(self, other: Self) -> (Self, Self) {
         two_product(self, other)
     }
+
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        self * factor + term
+    }
+
+    fn inverse(self) -> Self {
+        1.0 / self
+    }
+
+    fn abs(self) -> Self {
+        self.abs()
+    }
+
+    fn filled(self, x: Self) -> Self {
+        x
+    }
 }
 
 /// A number as the sum of a large and a small part.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Twice<D>(pub(crate) D, pub(crate) D);
+pub(crate) struct Twice<D>(D, D);
 
 impl<D: Numbers> Twice<D> {
     /// The exact sum of two numbers (Knuth).
@@ -55,49 +95,69 @@ impl<D: Numbers> Twice<D> {
         let a_part = difference - b_part;
         Self(difference, (a - a_part) - (b + b_part))
     }
+
+    /// Returns `self` − t · d.
+    #[inline(always)]
+    fn beyond(self, t: D, d: D) -> Self {
+        let (product, rest) = t.two_product(d);
+        let Self(large, small) = Self::difference(self.0, product);
+        Self(large, small + (self.1 - rest))
+    }
 }
 
-/// Returns a · b − c · d.
+/// Returns a · b − c · d, and the sum of the absolute products.
 #[inline(always)]
-fn determinant<D: Numbers>(a: Twice<D>, b: Twice<D>, c: Twice<D>, d: Twice<D>) -> Twice<D> {
+fn determinant<D: Numbers>(a: Twice<D>, b: Twice<D>, c: Twice<D>, d: Twice<D>) -> (Twice<D>, D) {
     let (first, first_rest) = a.0.two_product(b.0);
     let (second, second_rest) = c.0.two_product(d.0);
     let Twice(large, rest) = Twice::difference(first, second);
-    let small = (a.0 * b.1 + a.1 * b.0) - (c.0 * d.1 + c.1 * d.0);
-    Twice(large, rest + ((first_rest - second_rest) + small))
+    let small = a.0.mul_add(b.1, a.1 * b.0) - c.0.mul_add(d.1, c.1 * d.0);
+    let small = rest + ((first_rest - second_rest) + small);
+    (Twice(large, small), first.abs() + second.abs())
 }
 
-/// Returns the sum of three products; `small` is that of the products with small parts.
 #[inline(always)]
-fn sum_of_products<D: Numbers>(a: [D; 3], b: [D; 3], small: D) -> Twice<D> {
-    let (x, x_rest) = a[0].two_product(b[0]);
-    let (y, y_rest) = a[1].two_product(b[1]);
-    let (z, z_rest) = a[2].two_product(b[2]);
-    let Twice(xy, xy_rest) = Twice::sum(x, y);
-    let Twice(large, rest) = Twice::sum(xy, z);
-    Twice::sum(large, (xy_rest + rest) + ((x_rest + y_rest) + (z_rest + small)))
+fn dot<D: Numbers>(a: [D; 3], b: [D; 3]) -> D {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
 
-/// Returns the distance A · n / d · n of the plane with the normal n = p × q: the corner A and the
-/// sides p, q, exactly, and the direction d.
+/// Returns two bounds of the distance A · n / d · n of the plane with the normal n = p × q: the corner
+/// A and the sides p, q, exactly, and the direction d, which is not parallel to the plane. If they
+/// are equal, that is the distance, rounded once. `nearly` is a number close to it, if one is known
+/// already.
 #[inline(always)]
 pub(crate) fn distance<D: Numbers>(
-    corner: &[Twice<D>; 3],
-    direction: &[D; 3],
-    [px, py, pz]: &[Twice<D>; 3],
-    [qx, qy, qz]: &[Twice<D>; 3],
-) -> Twice<D> {
-    let x = determinant(*py, *qz, *pz, *qy);
-    let y = determinant(*pz, *qx, *px, *qz);
-    let z = determinant(*px, *qy, *py, *qx);
+    [ax, ay, az]: [Twice<D>; 3],
+    [dx, dy, dz]: [D; 3],
+    [px, py, pz]: [Twice<D>; 3],
+    [qx, qy, qz]: [Twice<D>; 3],
+    nearly: Option<D>,
+) -> [D; 2] {
+    let (x, x_size) = determinant(py, qz, pz, qy);
+    let (y, y_size) = determinant(pz, qx, px, qz);
+    let (z, z_size) = determinant(px, qy, py, qx);
     let normal = [x.0, y.0, z.0];
-    let [a, b, c] = *corner;
-    let small = (a.0 * x.1 + a.1 * x.0) + (b.0 * y.1 + b.1 * y.0) + (c.0 * z.1 + c.1 * z.0);
-    let height = sum_of_products([a.0, b.0, c.0], normal, small);
-    let [dx, dy, dz] = *direction;
-    let speed = sum_of_products([dx, dy, dz], normal, dx * x.1 + dy * y.1 + dz * z.1);
-    let t = height.0 / speed.0;
-    let (product, rest) = t.two_product(speed.0);
-    let remainder = ((height.0 - product) - rest) + (height.1 - t * speed.1);
-    Twice(t, remainder / speed.0)
+    let sizes = [x_size, y_size, z_size];
+    let inverse = dot([dx, dy, dz], normal).inverse();
+    let t = match nearly {
+        Some(t) => t,
+        None => dot([ax.0, ay.0, az.0], normal) * inverse,
+    };
+    let [px, py, pz] = [ax.beyond(t, dx), ay.beyond(t, dy), az.beyond(t, dz)];
+    let (first, first_rest) = px.0.two_product(x.0);
+    let (second, second_rest) = py.0.two_product(y.0);
+    let (third, third_rest) = pz.0.two_product(z.0);
+    let Twice(two, two_rest) = Twice::sum(first, second);
+    let Twice(large, rest) = Twice::sum(two, third);
+    // What is known first is added first.
+    let small = dot([x.1, y.1, z.1], [px.0, py.0, pz.0]);
+    let small = x.0.mul_add(px.1, y.0.mul_add(py.1, z.0.mul_add(pz.1, small)));
+    let small = ((two_rest + rest) + (first_rest + second_rest + third_rest)) + small;
+    let change = (large + small) * inverse;
+    let inverse = inverse.abs();
+    let height = dot([ax.0.abs(), ay.0.abs(), az.0.abs()], sizes) * inverse;
+    let tilt = dot([dx.abs(), dy.abs(), dz.abs()], sizes) * inverse;
+    let slack = t.abs().mul_add(tilt, height) * t.filled(1.0 / (1_u128 << 97) as f64);
+    let slack = (change.abs() * tilt).mul_add(t.filled(1.0 / (1_u64 << 48) as f64), slack);
+    [t + (change - slack), t + (change + slack)]
 }

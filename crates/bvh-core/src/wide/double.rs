@@ -18,31 +18,28 @@
 //! [`pairs`](super::pairs) has uR and nothing. The frame's own errors are below 2⁻³⁷ of both.
 //!
 //! With k = 1, a sheared coordinate is off by less than 14.4 uR and an edge value by less than
-//! 4 · 14.4 uRm + 8.5 uRm and a square: less than e (m + e) with e = 128 uR. A difference of depths
+//! 4 · 14.4 uRm + 8.5 uRm and a square: less than e (m + e) with e = 72 uR. A difference of depths
 //! is off by 10 uR, X by 5EΔ / |a| + (55 + 17) uR, and the other terms together by 36 uR: less than
-//! e, too. So the bounds of f32 hold with 2kR for R. Ends of a range are rounded to f32: beyond the
+//! 128 uR. So the bounds of f32 hold with 2kR for R. Ends of a range are rounded to f32: beyond the
 //! slack |T − t| exceeds u|t|, so that t and the end itself are on the same sides. A half of the largest extent is never more than
 //! R, and so k is at most S over that half.
 
 use super::answer::{ANY_HIT, Bounded, NEAREST_HIT};
-use super::box_ray::{BoxRay, FarBoxRay};
-use super::double_block::{DoubleBlock, rounded_distance};
-use super::instructions::{Instructions, Pending, Task};
-use super::kernel::{SPARE, STACK, deep_stacks};
-use super::lanes::{Aligned, Lanes};
+use super::double_block::{decide, rounded_distance, splat};
+use super::instructions::{Instructions, Task};
+use super::lanes::{DoubleLanes, Lanes};
 use super::layout::{WideBvh, WideNode};
-use super::one_ray::{LeafRay, Leaves, visit};
+use super::one_ray::{DeferredRay, Leaves, traverse};
 use super::triangles::TriangleBlock;
 use super::{build, portable, vector};
 use crate::double::{NearestHit, Query};
 use crate::slabs::FarRay;
 use crate::{
-    Aabb, Bvh, DHit, DRay, DTriangle, Frame, Hit, InFrame, InvalidBvh, Kernel, Ray, Select, Slabs,
-    Triangle, validate_references,
+    Aabb, Bvh, DHit, DRay, DTriangle, Frame, Hit, InFrame, InvalidBvh, Kernel, Orientation, Ray,
+    Select, Slabs, Triangle, validate_references,
 };
 use bytemuck::Zeroable;
-use core::mem::MaybeUninit;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec4};
 use std::borrow::Cow;
 
 /// An immutable copy of a tree and its triangles in f64, for tracing only.
@@ -70,14 +67,10 @@ pub struct DWideBvh {
     /// The triangles in f32, in the frame.
     pub(super) wide: WideBvh,
     pub(super) frame: Frame,
+    /// The axes of the file in the frame.
+    columns: [[f64; 4]; 3],
     /// By id.
     pub(super) triangles: Box<[DTriangle]>,
-}
-
-/// A ray as the layout is traversed with it.
-pub(super) struct Boxed {
-    pub(super) ray: Ray,
-    ends: [DVec3; 2],
 }
 
 impl DWideBvh {
@@ -105,7 +98,9 @@ impl DWideBvh {
             wide.bounds = framed.bounds;
             wide.near = framed.near;
         }
-        Ok(Self { wide, frame, triangles: triangles.into() })
+        let [x, y, z] = frame.axes;
+        let columns = [0, 1, 2].map(|axis| [x[axis], y[axis], z[axis], 0.0]);
+        Ok(Self { wide, frame, columns, triangles: triangles.into() })
     }
 
     /// Returns the boxes of triangles in a frame, to build a tree over.
@@ -130,15 +125,35 @@ impl DWideBvh {
 
     /// Returns the nearest triangle that `ray` meets in its range, among those that count. Of several
     /// at the same distance, the one with the lowest id is nearest.
+    #[inline]
     pub fn nearest_hit(&self, ray: &DRay, select: Select) -> Option<DHit> {
-        let mut nearest = NearestHit::new(ray);
-        self.search::<NEAREST_HIT>(self.query(ray, select), &mut nearest);
-        nearest.hit()
+        self.nearest_hit_of(ray, select.orientation, select.exclude)
     }
 
     /// Returns whether `ray` meets any triangle that counts in its range.
+    #[inline]
     pub fn any_hit(&self, ray: &DRay, select: Select) -> bool {
-        self.search::<ANY_HIT>(self.query(ray, select), &mut NearestHit::new(ray))
+        self.any_hit_of(ray, select.orientation, select.exclude)
+    }
+
+    // By numbers in registers: a load of two that were just written would wait until they have
+    // reached the cache.
+
+    fn nearest_hit_of(
+        &self,
+        ray: &DRay,
+        orientation: Orientation,
+        exclude: &[u32],
+    ) -> Option<DHit> {
+        let mut nearest = NearestHit::new(ray);
+        let query = self.query(ray, Select { orientation, exclude });
+        self.search::<NEAREST_HIT>(&query, &mut nearest);
+        nearest.hit()
+    }
+
+    fn any_hit_of(&self, ray: &DRay, orientation: Orientation, exclude: &[u32]) -> bool {
+        let query = self.query(ray, Select { orientation, exclude });
+        self.search::<ANY_HIT>(&query, &mut NearestHit::new(ray))
     }
 
     /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest first;
@@ -147,14 +162,14 @@ impl DWideBvh {
     pub fn all_hits(&self, ray: &DRay) -> Vec<DHit> {
         let mut hits = Vec::new();
         if self.wide.kernel == Kernel::Portable {
-            self.visit_portable::<ANY_HIT>(&self.boxed(ray), |block, _| {
+            self.visit_portable::<ANY_HIT>(ray, |block, _| {
                 block.triangles().for_each(|(object, _)| hits.extend(self.hit_of(ray, object)));
                 false
             });
         } else {
             let task = AllHits { layout: self, ray, hits: &mut hits };
             // SAFETY: a layout's kernel is available.
-            unsafe { vector::dispatch(self.wide.kernel, task) };
+            unsafe { vector::dispatch::<_, ()>(self.wide.kernel, task) };
         }
         // No distance is negative or −0, so distances are ordered as their bits are. A divided
         // triangle is hit in several leaves, every time at the same distance.
@@ -171,12 +186,13 @@ impl DWideBvh {
     /// Visits the blocks that a ray enters by [`Kernel::Portable`].
     fn visit_portable<const ANY: bool>(
         &self,
-        boxed: &Boxed,
+        ray: &DRay,
         visit: impl FnMut(&TriangleBlock, &mut Hit) -> bool,
     ) -> Hit {
-        let slabs = Slabs::of_frame(&boxed.ray, boxed.ends, &self.frame, &self.wide.bounds);
+        let boxed = self.boxed(ray);
+        let slabs = Slabs::of_frame(&boxed, ray.scaled_ends(), &self.frame, &self.wide.bounds);
         let intervals = |node: &WideNode| portable::intervals(&slabs, node);
-        portable::traverse::<ANY>(&self.wide, boxed.ray.t_max(), intervals, &mut (), visit)
+        portable::traverse::<ANY>(&self.wide, boxed.t_max(), intervals, &mut (), visit)
     }
 
     pub(super) fn resolve_alone(&self, ray: &DRay, nearest: &mut NearestHit) {
@@ -185,59 +201,103 @@ impl DWideBvh {
         }
     }
 
+    fn far_ray(&self, ray: &DRay) -> FarRay {
+        FarRay::in_frame(ray.scaled_ends(), &self.frame, &self.wide.bounds)
+    }
+
     fn query<'a>(&'a self, ray: &'a DRay, select: Select<'a>) -> Query<'a> {
         Query { triangles: &self.triangles, ray, select }
     }
 
     /// Returns the ray in the frame. Its direction has a largest component of about 1, so that f32
     /// has all distances within the scene.
+    pub(super) fn boxed(&self, ray: &DRay) -> Ray {
+        self.frame.ray_of(ray.scaled_ends(), [ray.single(ray.t_min), ray.single(ray.t_max)])
+    }
+
+    /// Returns the same, but for operations that are fused: an axis of the frame per lane.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`, which has four lanes.
     #[inline(always)]
-    pub(super) fn boxed(&self, ray: &DRay) -> Boxed {
-        let unit = ray.unit();
-        let ends = [ray.origin, ray.direction * unit];
-        let ray = self.frame.ray_of(ends, [single(ray.t_min, unit), single(ray.t_max, unit)]);
-        Boxed { ray, ends }
+    unsafe fn boxed_by<L: Lanes>(&self, ray: &DRay) -> Ray {
+        const { assert!(L::N == 4) };
+        let [size, unit] = ray.scales();
+        let mut vectors = [Vec4::ZERO; 3];
+        // SAFETY: the processor has the instructions; a vector has four numbers.
+        unsafe {
+            let [origin, direction, inverse] =
+                vectors.each_mut().map(|vector| (&raw mut *vector).cast());
+            L::single(self.turned::<L>(ray.origin - self.frame.centre)).store(origin);
+            // The unit is found meanwhile.
+            let along = self.turned::<L>(ray.direction);
+            L::single(along * along.filled(unit)).store(direction);
+            L::single(along.filled(Frame::ABOVE * size) / along).store(inverse);
+        }
+        let [origin, direction, inverse] = vectors.map(Vec4::truncate);
+        let [t_min, t_max] = [ray.single(ray.t_min), ray.single(ray.t_max)];
+        Ray::with_inverse(origin, direction, inverse, t_min, t_max)
+    }
+
+    /// Returns the components of a direction in the frame, a lane each.
+    #[inline(always)]
+    unsafe fn turned<L: Lanes>(&self, direction: DVec3) -> L::Double {
+        // SAFETY: the processor has the instructions; a column has four numbers.
+        unsafe {
+            let [x, y, z] = splat::<L>(direction);
+            let [first, second, third] = &self.columns;
+            let first = L::Double::load(first.as_ptr());
+            let second = L::Double::load(second.as_ptr());
+            let third = L::Double::load(third.as_ptr());
+            z.mul_add(third, y.mul_add(second, x * first))
+        }
     }
 
     /// Finds the nearest hit that counts, or with `ANY` any. Returns whether there is one.
-    pub(super) fn search<const ANY: bool>(&self, query: Query, nearest: &mut NearestHit) -> bool {
+    #[inline]
+    pub(super) fn search<const ANY: bool>(&self, query: &Query, nearest: &mut NearestHit) -> bool {
         if self.wide.kernel != Kernel::Portable {
             let task = Search::<ANY> { layout: self, query, nearest };
             // SAFETY: a layout's kernel is available.
             return unsafe { vector::dispatch(self.wide.kernel, task) };
         }
-        let boxed = self.boxed(query.ray);
+        self.search_portable::<ANY>(query, nearest)
+    }
+
+    #[inline(never)]
+    fn search_portable<const ANY: bool>(&self, query: &Query, nearest: &mut NearestHit) -> bool {
         let visit = |block: &TriangleBlock, limit: &mut Hit| {
             let mut is_nearer = false;
             for (object, _) in block.triangles() {
                 is_nearer |= query.offer(nearest, object);
             }
             if is_nearer {
-                *limit = Hit { t: single(nearest.high, nearest.unit), object: 0 };
+                *limit = Hit { t: query.ray.single(nearest.high), object: 0 };
             }
             is_nearer
         };
-        let hit = self.visit_portable::<ANY>(&boxed, visit);
+        let hit = self.visit_portable::<ANY>(query.ray, visit);
         self.resolve_alone(query.ray, nearest);
         !hit.is_miss()
     }
 
-    /// Takes those triangles of a block that are nearer. Returns whether there are any.
+    /// Takes those triangles of a block that are nearer. Returns the ray's new end in f32, if there
+    /// are any.
     ///
     /// # Safety
     /// The processor has the instructions of `K`; the block is one of the layout.
     #[inline(always)]
     pub(super) unsafe fn offer_block<K: Instructions>(
         &self,
-        query: Query,
+        query: &Query,
         nearest: &mut NearestHit,
         block: &TriangleBlock,
         bounded: &Bounded,
-    ) -> bool {
+    ) -> Option<f32> {
         let Bounded { low, high, possible, certain, along } = *bounded;
         // SAFETY: the processor has the instructions.
         let used = unsafe { block.used::<K::Block>() };
-        let mut is_nearer = false;
+        let mut end = None;
         let mut lanes = query.select.oriented(certain & used, along);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize & 3;
@@ -246,26 +306,24 @@ impl DWideBvh {
             if query.select.exclude.contains(&object) {
                 continue;
             }
-            let bounds =
-                (f64::from(low[lane]) * nearest.unit, f64::from(high[lane]) * nearest.unit);
-            let new = nearest.other(bounds, object);
+            let new = NearestHit::between(query.ray.doubles(low[lane], high[lane]), object);
             // It is certainly in the ray's range.
             if new.high < nearest.low {
                 *nearest = new;
-                is_nearer = true;
-                let triangle = (&raw const query.triangles[object as usize]).cast();
-                // SAFETY: the processor has the instructions.
-                unsafe { K::prefetch_bytes(triangle, size_of::<DTriangle>()) };
-            } else if new.low <= nearest.high {
-                is_nearer |= query.take_close(nearest, new);
+                end = Some(high[lane]);
+            } else if new.low <= nearest.high && query.take_close(nearest, new) {
+                end = Some(query.ray.single(nearest.high));
             }
         }
         let others = possible & !certain & used;
         if others != 0 {
+            let doubles = InDoubles { query: *query, nearest, block, possible: others };
             // SAFETY: as above.
-            is_nearer |= unsafe { K::call(InDoubles { query, nearest, block, possible: others }) };
+            if unsafe { K::call(doubles) } {
+                end = Some(query.ray.single(nearest.high));
+            }
         }
-        is_nearer
+        end
     }
 
     /// Returns a triangle of a block that the ray hits, if there is one.
@@ -275,7 +333,7 @@ impl DWideBvh {
     #[inline(always)]
     pub(super) unsafe fn any_of<K: Instructions>(
         &self,
-        query: Query,
+        query: &Query,
         block: &TriangleBlock,
         Bounded { possible, certain, along, .. }: &Bounded,
     ) -> Option<u32> {
@@ -295,24 +353,16 @@ impl DWideBvh {
         let is_hit = others != 0
             && unsafe {
                 let nearest = &mut nearest;
-                K::call(InDoubles { query, nearest, block, possible: others })
+                K::call(InDoubles { query: *query, nearest, block, possible: others })
             };
         is_hit.then_some(nearest.object)
     }
 }
 
-/// Returns a distance of the form in f32.
-#[inline(always)]
-pub(super) fn single(t: f64, unit: f64) -> f32 {
-    // The reciprocal of a power of two is exact.
-    let size = f64::from_bits(1.0f64.to_bits() * 2 - unit.to_bits());
-    ((t * size) as f32).min(f32::MAX)
-}
-
 /// A search by a vector kernel.
 struct Search<'a, const ANY: bool> {
     layout: &'a DWideBvh,
-    query: Query<'a>,
+    query: &'a Query<'a>,
     nearest: &'a mut NearestHit,
 }
 
@@ -324,42 +374,18 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
         let Self { layout, query, nearest } = self;
         // SAFETY: the processor has the instructions.
         unsafe {
-            let boxed = layout.boxed(query.ray);
-            let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &layout.wide);
+            let boxed = layout.boxed_by::<K::Block>(query.ray);
+            let leaf_ray = DeferredRay::new(&boxed, &layout.wide);
             let mut leaves = Candidates::<_, ANY> { layout, leaf_ray, query, nearest };
-            let hit = traverse::<K, ANY>(layout, &boxed, &mut leaves);
+            let hit = traverse::<K, ANY>(&layout.wide, &boxed, &mut leaves);
             if !ANY && !nearest.is_known() {
                 let triangle = &layout.triangles[nearest.object as usize];
-                match rounded_distance::<K::Block>(query.ray, triangle) {
+                match rounded_distance::<K::Block>(query.ray, triangle, nearest) {
                     Some(t) => (nearest.low, nearest.high) = (t, t),
                     None => layout.resolve_alone(query.ray, nearest),
                 }
             }
             !hit.is_miss()
-        }
-    }
-}
-
-/// Visits the leaves that a ray enters.
-#[inline(always)]
-unsafe fn traverse<K: Instructions, const ANY: bool>(
-    layout: &DWideBvh,
-    boxed: &Boxed,
-    leaves: &mut impl Leaves<K>,
-) -> Hit {
-    let Boxed { ray, ends } = boxed;
-    let wide = &layout.wide;
-    let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
-    let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
-    let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
-    // SAFETY: the processor has the instructions; the stack has room for `stack_need` children and
-    // one register more.
-    unsafe {
-        if ray.begins_in(&wide.near) {
-            visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), leaves, base)
-        } else {
-            let far = FarRay::in_frame(*ends, &layout.frame, &wide.bounds);
-            visit::<K, ANY>(wide, ray.t_max(), &FarBoxRay::new(ray, &far), leaves, base)
         }
     }
 }
@@ -378,42 +404,48 @@ impl<K: Instructions> Task<K> for AllHits<'_> {
     unsafe fn run(self) {
         // SAFETY: the processor has the instructions.
         unsafe {
-            let boxed = self.layout.boxed(self.ray);
-            let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &self.layout.wide);
             let layout = self.layout;
-            traverse::<K, ANY_HIT>(layout, &boxed, &mut AllCandidates { leaf_ray, hits: self });
+            let boxed = layout.boxed_by::<K::Block>(self.ray);
+            let leaf_ray = DeferredRay::new(&boxed, &layout.wide);
+            let mut leaves = AllCandidates { leaf_ray, hits: self };
+            traverse::<K, ANY_HIT>(&layout.wide, &boxed, &mut leaves);
         }
     }
 }
 
 /// Takes the triangles of a block that the ray crosses.
-struct AllCandidates<'a, L> {
-    leaf_ray: LeafRay<L>,
+struct AllCandidates<'a, 'r, L> {
+    leaf_ray: DeferredRay<'r, L>,
     hits: AllHits<'a>,
 }
 
-impl<K: Instructions> Leaves<K> for AllCandidates<'_, K::Block> {
+impl<K: Instructions> Leaves<K> for AllCandidates<'_, '_, K::Block> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, _: &mut Hit) -> bool {
         let AllHits { layout, ray, hits } = &mut self.hits;
         // SAFETY: the processor has the instructions.
         let possible = unsafe {
-            let corners = self.leaf_ray.corners(block);
-            self.leaf_ray.pairs.candidates(&corners).crossings.possible & block.used::<K::Block>()
+            let leaf_ray = self.leaf_ray.get::<K>();
+            let corners = leaf_ray.corners(block);
+            leaf_ray.pairs.candidates(&corners).crossings.possible & block.used::<K::Block>()
         };
         for lane in (0..TriangleBlock::LANES).filter(|lane| possible >> lane & 1 != 0) {
             hits.extend(layout.hit_of(ray, block.id(lane)));
         }
         false
     }
+
+    fn far_ray(&self, _: &WideBvh, _: &Ray) -> FarRay {
+        self.hits.layout.far_ray(self.hits.ray)
+    }
 }
 
 /// Passes the triangles of a block on that the ray may meet.
-struct Candidates<'a, 'n, L, const ANY: bool> {
+struct Candidates<'a, 'r, L, const ANY: bool> {
     layout: &'a DWideBvh,
-    leaf_ray: LeafRay<L>,
-    query: Query<'a>,
-    nearest: &'n mut NearestHit,
+    leaf_ray: DeferredRay<'r, L>,
+    query: &'a Query<'a>,
+    nearest: &'a mut NearestHit,
 }
 
 impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block, ANY> {
@@ -421,14 +453,15 @@ impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions.
         unsafe {
-            let corners = self.leaf_ray.corners(block);
-            let candidates = self.leaf_ray.pairs.candidates(&corners);
-            let (possible, certain) =
-                self.leaf_ray.pairs.within(&candidates, K::Block::splat(nearest.t));
+            let leaf_ray = self.leaf_ray.get::<K>();
+            let corners = leaf_ray.corners(block);
+            let pairs = &leaf_ray.pairs;
+            let candidates = pairs.candidates(&corners);
+            let (possible, certain) = pairs.within(&candidates, K::Block::splat(nearest.t));
             if possible == 0 {
                 return false;
             }
-            let ([low, high], along) = self.leaf_ray.pairs.distances(&candidates);
+            let ([low, high], along) = pairs.distances(&candidates);
             let mut bounded = Bounded { possible, certain, along, ..Bounded::zeroed() };
             if ANY {
                 let hit = self.layout.any_of::<K>(self.query, block, &bounded);
@@ -437,13 +470,19 @@ impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block
             }
             low.store(bounded.low.as_mut_ptr());
             high.store(bounded.high.as_mut_ptr());
-            let is_nearer = self.layout.offer_block::<K>(self.query, self.nearest, block, &bounded);
-            if is_nearer {
-                let t = single(self.nearest.high, self.nearest.unit);
-                *nearest = Hit { t, object: self.nearest.object };
+            let end = self.layout.offer_block::<K>(self.query, self.nearest, block, &bounded);
+            if let Some(t) = end {
+                let object = self.nearest.object;
+                *nearest = Hit { t, object };
+                let triangle = self.query.triangles.as_ptr().wrapping_add(object as usize);
+                K::prefetch_bytes(triangle.cast(), size_of::<DTriangle>());
             }
-            is_nearer
+            end.is_some()
         }
+    }
+
+    fn far_ray(&self, _: &WideBvh, _: &Ray) -> FarRay {
+        self.layout.far_ray(self.query.ray)
     }
 }
 
@@ -463,13 +502,12 @@ impl<K: Instructions> Task<K> for InDoubles<'_, '_> {
     #[inline(always)]
     unsafe fn run(self) -> bool {
         let Self { query, nearest, block, possible } = self;
-        let doubles = DoubleBlock::new(block, query.triangles);
-        // SAFETY: the processor has the instructions.
-        let decided = unsafe { doubles.decide::<K::Block>(query.ray, possible) };
+        // SAFETY: the processor has the instructions; the block is one of the layout.
+        let decided = unsafe { decide::<K::Block>(query.ray, block, query.triangles, possible) };
         let mut is_nearer = false;
         for lane in (0..TriangleBlock::LANES).filter(|lane| decided.hits >> lane & 1 != 0) {
             let bounds = (decided.low[lane], decided.high[lane]);
-            is_nearer |= query.take(nearest, nearest.other(bounds, block.id(lane)));
+            is_nearer |= query.take(nearest, NearestHit::between(bounds, block.id(lane)));
         }
         for lane in (0..TriangleBlock::LANES).filter(|lane| decided.unsure >> lane & 1 != 0) {
             is_nearer |= query.offer(nearest, block.id(lane));

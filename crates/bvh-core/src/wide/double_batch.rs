@@ -2,16 +2,16 @@
 //! distance of each ray's hit.
 
 use super::answer::{ANY_HIT, Bounded, Find, Known, NEAREST_HIT};
-use super::double::{DWideBvh, single};
-use super::double_block::Distances;
+use super::double::DWideBvh;
+use super::double_block::{RAYS, gathered, rounded_distances};
 use super::instructions::{Instructions, Task};
-use super::lanes::{Aligned, DoubleLanes, Lanes};
+use super::lanes::{DoubleLanes, Lanes};
 use super::layout::WideBvh;
 use super::ray_lanes::{BoxLanes, RayLanes, Rays, in_frame};
 use super::triangles::TriangleBlock;
 use super::vector;
 use crate::double::{NearestHit, Query};
-use crate::{Coherence, DHit, DRay, Frame, Hit, Kernel, Select};
+use crate::{Coherence, DHit, DRay, DTriangle, Frame, Hit, Kernel, Select};
 
 /// The number of rays of which something is kept at a time.
 const AT_ONCE: usize = 4096;
@@ -108,6 +108,12 @@ impl DWideBvh {
     }
 }
 
+/// The bounds of a distance that is found at the end.
+const UNKNOWN: (f64, f64) = (0.0, f64::INFINITY);
+
+/// By how many rays the triangles that they hit are fetched ahead.
+const AHEAD: usize = 16;
+
 /// The search for distances that are not known yet.
 struct Resolve<'a> {
     layout: &'a DWideBvh,
@@ -121,21 +127,32 @@ impl<K: Instructions> Task<K> for Resolve<'_> {
     #[inline(always)]
     unsafe fn run(self) {
         let Self { layout, rays, nearest } = self;
-        let mut distances = Distances::EMPTY;
-        let mut numbers = [0; Distances::COUNT];
+        let last = layout.triangles.len().saturating_sub(1);
+        // Lanes without a hit have others of these.
+        let mut their_rays = [rays.as_ptr(); RAYS];
+        let mut their_triangles = [layout.triangles.as_ptr(); RAYS];
+        let mut numbers = [0; RAYS];
         let mut count = 0;
         for number in 0..nearest.len() {
+            if let Some(ahead) = nearest.get(number + AHEAD) {
+                let object = last.min(ahead.object as usize);
+                let triangle = layout.triangles.as_ptr().wrapping_add(object);
+                // SAFETY: the processor has the instructions; a prefetch may name any address.
+                unsafe { K::prefetch_bytes(triangle.cast(), size_of::<DTriangle>()) };
+            }
             let hit = nearest[number];
             if !hit.is_known() {
-                distances.set(count, &rays[number], &layout.triangles[hit.object as usize]);
+                their_rays[count] = &rays[number];
+                their_triangles[count] = &layout.triangles[hit.object as usize];
                 numbers[count] = number;
                 count += 1;
             }
             if count < K::Rays::N && (number + 1 < nearest.len() || count == 0) {
                 continue;
             }
-            // SAFETY: the processor has the instructions.
-            let (rounded, is_decided) = unsafe { distances.rounded::<K::Rays>() };
+            // SAFETY: the processor has the instructions; the rays and what they hit exist.
+            let (rounded, is_decided) =
+                unsafe { rounded_distances::<K::Rays>(&their_rays, &their_triangles) };
             for (lane, &number) in numbers[..count].iter().enumerate() {
                 if is_decided >> lane & 1 != 0 {
                     let hit = &mut nearest[number];
@@ -209,26 +226,16 @@ impl Rays for DRays<'_> {
         end: usize,
         _: Option<&Frame>,
     ) -> (RayLanes<L>, BoxLanes<L>) {
-        let mut rows = Aligned([[0.0; 16]; 9]);
-        for lane in 0..L::N {
-            // SAFETY: there is a ray before the end.
-            let ray = unsafe { self.rays.get_unchecked((first + lane).min(end - 1)) };
-            let unit = ray.unit();
-            for axis in 0..3 {
-                rows.0[axis][lane] = ray.origin[axis];
-                rows.0[3 + axis][lane] = ray.direction[axis] * unit;
-            }
-            rows.0[6][lane] = ray.t_min;
-            rows.0[7][lane] = ray.t_max;
-            rows.0[8][lane] = unit;
-        }
-        // SAFETY: the processor has the instructions; there are so many numbers.
+        let last = end - 1 - first;
+        let ray = |lane: usize| self.rays.as_ptr().wrapping_add(first + lane.min(last)).cast();
+        // SAFETY: the processor has the instructions; the rays exist.
         unsafe {
-            let [x, y, z] = load::<L>(&rows.0, 0);
-            let [dx, dy, dz] = load::<L>(&rows.0, 3);
-            let [t_min, t_max, unit] = load::<L>(&rows.0, 6);
-            let size = unit.filled(1.0) / unit;
-            let (direction, boxed) = in_frame::<L>([x, y, z], [dx, dy, dz], self.frame);
+            let rays = core::array::from_fn(ray);
+            let [x, y, z, dx, dy, dz, t_min, t_max] = gathered::<L::Double, 8, RAYS>(&rays);
+            let size = dx.abs().max(dy.abs()).max(dz.abs()).power_of_two();
+            let unit = size.filled(1.0) / size;
+            let along = [dx * unit, dy * unit, dz * unit];
+            let (direction, boxed) = in_frame::<L>([x, y, z], along, self.frame);
             let t_min = L::single(t_min * size);
             let t_max = L::single(t_max * size);
             let most = t_max.filled(f32::MAX);
@@ -242,19 +249,6 @@ impl Rays for DRays<'_> {
         let next = self.rays.as_ptr().wrapping_add(first).cast::<u8>();
         // SAFETY: a prefetch may name any address.
         unsafe { K::prefetch_bytes(next, K::Rays::N * size_of::<DRay>()) };
-    }
-}
-
-/// Loads three rows.
-#[inline(always)]
-unsafe fn load<L: Lanes>(rows: &[[f64; 16]; 9], first: usize) -> [L::Double; 3] {
-    // SAFETY: the processor has the instructions; there are so many numbers.
-    unsafe {
-        [
-            L::Double::load(rows[first].as_ptr()),
-            L::Double::load(rows[first + 1].as_ptr()),
-            L::Double::load(rows[first + 2].as_ptr()),
-        ]
     }
 }
 
@@ -282,15 +276,22 @@ impl<'a> Find for Nearest<'a> {
         let nearest = &mut self.nearest[number];
         // What is known of the same triangle already is more.
         if object != nearest.object {
-            let bounds = (f64::from(low) * nearest.unit, f64::from(high) * nearest.unit);
-            *nearest = nearest.other(bounds, object);
+            *nearest = NearestHit::between(self.part.rays[number].doubles(low, high), object);
         }
     }
 
     fn known(&self, number: usize) -> Known {
-        let NearestHit { low, high, unit, object } = self.nearest[number];
-        let (low, high) = (single(low, unit).next_down(), single(high, unit).next_up());
-        Known { low, high, object }
+        let NearestHit { low, high, object } = self.nearest[number];
+        let ray = &self.part.rays[number];
+        Known { low: ray.single(low).next_down(), high: ray.single(high).next_up(), object }
+    }
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, object: u32) {
+        let nearest = &mut self.nearest[number];
+        if object != nearest.object {
+            *nearest = NearestHit::between(UNKNOWN, object);
+        }
     }
 
     #[inline(always)]
@@ -303,15 +304,13 @@ impl<'a> Find for Nearest<'a> {
         let query = self.part.query(number);
         let nearest = &mut self.nearest[number];
         // SAFETY: the processor has the instructions; the block is one of the layout.
-        let is_nearer =
-            unsafe { self.part.layout.offer_block::<K>(query, nearest, block, bounded) };
-        let t = single(nearest.high, nearest.unit);
-        is_nearer.then_some(Hit { t, object: nearest.object })
+        let end = unsafe { self.part.layout.offer_block::<K>(&query, nearest, block, bounded) };
+        end.map(|t| Hit { t, object: nearest.object })
     }
 
     fn alone(&mut self, _: &WideBvh, number: usize) {
         let query = self.part.query(number);
-        self.part.layout.search::<NEAREST_HIT>(query, &mut self.nearest[number]);
+        self.part.layout.search::<NEAREST_HIT>(&query, &mut self.nearest[number]);
     }
 }
 
@@ -346,7 +345,7 @@ impl<'a, const PLAIN: bool> Find for Any<'a, PLAIN> {
     ) -> Option<Hit> {
         let query = self.part.query(number);
         // SAFETY: the processor has the instructions; the block is one of the layout.
-        let hit = unsafe { self.part.layout.any_of::<K>(query, block, bounded) };
+        let hit = unsafe { self.part.layout.any_of::<K>(&query, block, bounded) };
         hit.map(|object| Hit { t: 0.0, object })
     }
 
@@ -358,7 +357,7 @@ impl<'a, const PLAIN: bool> Find for Any<'a, PLAIN> {
     fn alone(&mut self, _: &WideBvh, number: usize) {
         let query = self.part.query(number);
         let mut nearest = NearestHit::new(query.ray);
-        self.hits[number] = self.part.layout.search::<ANY_HIT>(query, &mut nearest);
+        self.hits[number] = self.part.layout.search::<ANY_HIT>(&query, &mut nearest);
     }
 }
 
@@ -372,9 +371,8 @@ struct All<'a> {
 
 impl All<'_> {
     fn take(&mut self, number: usize, hit: DHit) {
-        let (t, nearest) = (hit.t, NearestHit::new(&self.part.rays[number]));
         self.numbers.push(number);
-        self.found.push(nearest.other((t, t), hit.object));
+        self.found.push(NearestHit::between((hit.t, hit.t), hit.object));
     }
 }
 
@@ -406,10 +404,9 @@ impl<'a> Find for All<'a> {
                 let hit = layout.hit_of(ray, block.id(lane));
                 hit.into_iter().for_each(|hit| self.take(number, hit));
             } else {
-                // It crosses no edge, in the ray's range, at a distance that is not known yet.
-                let unknown = (0.0, f64::INFINITY);
+                // It crosses no edge, in the ray's range.
                 self.numbers.push(number);
-                self.found.push(NearestHit::new(ray).other(unknown, block.id(lane)));
+                self.found.push(NearestHit::between(UNKNOWN, block.id(lane)));
             }
         }
         None

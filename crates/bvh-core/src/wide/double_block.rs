@@ -3,20 +3,10 @@
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::triangles::TriangleBlock;
-use crate::double::largest_axis;
-use crate::exact::AXES;
-use crate::exact::{ERROR, NARROWER, Twice, distance};
+use crate::double::{NearestHit, largest_axis};
+use crate::exact::{AXES, ERROR, Twice, distance};
 use crate::{DRay, DTriangle};
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
-
-/// The triangles of a [`TriangleBlock`] in f64.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct DoubleBlock {
-    /// `corners[corner][axis][lane]`.
-    corners: [[[f64; TriangleBlock::LANES]; 3]; 3],
-}
 
 /// What f64 decides about a ray and the triangles of a block.
 pub(super) struct Decided {
@@ -28,110 +18,96 @@ pub(super) struct Decided {
     pub(super) high: [f64; TriangleBlock::LANES],
 }
 
-impl DoubleBlock {
-    /// The triangles of a block, with the last one in unused lanes.
-    pub(super) fn new(block: &TriangleBlock, triangles: &[DTriangle]) -> Self {
-        let mut corners = [[[0.0; TriangleBlock::LANES]; 3]; 3];
-        let mut last = block.id(0);
-        for lane in 0..TriangleBlock::LANES {
-            last = if block.triangle(lane).is_some() { block.id(lane) } else { last };
-            for (axes, corner) in corners.iter_mut().zip(triangles[last as usize].0) {
-                (0..3).for_each(|axis| axes[axis][lane] = corner[axis]);
-            }
-        }
-        Self { corners }
-    }
+/// Returns the corners of the triangles in these `lanes` of a block, of which there is one, and of any
+/// of them in other lanes.
+///
+/// # Safety
+/// The processor has the instructions of `L`, which has four lanes; the triangles are those of the
+/// block.
+#[inline(always)]
+pub(super) unsafe fn corners_of<L: Lanes>(
+    block: &TriangleBlock,
+    triangles: &[DTriangle],
+    lanes: u32,
+) -> [Vector<L::Double>; 3] {
+    const { assert!(L::N == TriangleBlock::LANES) };
+    let any = lanes.trailing_zeros() as usize % TriangleBlock::LANES;
+    let triangle = |lane: usize| {
+        let object = block.id(if lanes >> lane & 1 != 0 { lane } else { any });
+        triangles.as_ptr().wrapping_add(object as usize).cast()
+    };
+    let triangles = [triangle(0), triangle(1), triangle(2), triangle(3)];
+    // SAFETY: the processor has the instructions; a triangle is nine numbers.
+    let [ax, ay, az, bx, by, bz, cx, cy, cz] = unsafe { gathered::<L::Double, 9, 4>(&triangles) };
+    [[ax, ay, az], [bx, by, bz], [cx, cy, cz]]
+}
 
-    /// Returns the corners of each triangle along these axes.
-    ///
-    /// # Safety
-    /// As [`decide`](Self::decide).
-    #[inline(always)]
-    pub(super) unsafe fn corners_along<L: Lanes>(&self, axes: [usize; 3]) -> [[L::Double; 3]; 3] {
-        let [a, b, c] = &self.corners;
-        // SAFETY: the processor has the instructions.
-        unsafe { [load::<L>(a, axes), load::<L>(b, axes), load::<L>(c, axes)] }
-    }
-
-    /// Decides about those of the `possible` triangles that f64 suffices for.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`, which has four lanes.
-    #[inline(always)]
-    pub(super) unsafe fn decide<L: Lanes>(&self, ray: &DRay, possible: u32) -> Decided {
-        const { assert!(L::N == TriangleBlock::LANES) };
-        let [i, j, k] = AXES[largest_axis(ray.direction)];
-        // SAFETY: the processor has the instructions; there are so many numbers.
-        unsafe {
-            let (origin, direction) = (ray.origin, ray.direction);
-            let origin = splat::<L>(DVec3::new(origin[i], origin[j], origin[k]));
-            let [dx, dy, dz] = splat::<L>(DVec3::new(direction[i], direction[j], direction[k]));
-            let [first, second, third] = [
-                load::<L>(&self.corners[0], [i, j, k]),
-                load::<L>(&self.corners[1], [i, j, k]),
-                load::<L>(&self.corners[2], [i, j, k]),
-            ];
-            let error = L::Double::splat(ERROR);
-            let zero = L::Double::splat(0.0);
-            // As in `Line::edges`.
-            let from = minus(first, origin);
-            let to_second = minus(second, origin);
-            let to_third = minus(third, origin);
-            let reach = largest(from).max(largest(to_second)).max(largest(to_third));
-            let [ax, ay] = sheared(from, [dx, dy, dz]);
-            let [bx, by] = sheared(to_second, [dx, dy, dz]);
-            let [cx, cy] = sheared(to_third, [dx, dy, dz]);
-            let spread = largest([ax, bx, cx]).max(largest([ay, by, cy]));
-            let coordinate_error = reach * dz.abs() * error;
-            let bound = coordinate_error * (spread + coordinate_error);
-            let u = cx * by - cy * bx;
-            let v = ax * cy - ay * cx;
-            let w = bx * ay - by * ax;
-            let least = u.min(v).min(w);
-            let most = u.max(v).max(w);
-            let below = zero - bound;
-            let is_inside = bound.lt(least) | most.lt(below);
-            let is_outside = least.lt(below) & bound.lt(most);
-            let sides = [minus(second, first), minus(third, first)];
-            let (t, slack, is_known) = plane(from, [dx, dy, dz], sides);
-            let low = t - slack;
-            let high = t + slack;
-            let hits = is_inside & is_known & zero.le(low);
-            let misses = is_outside | is_inside & is_known & high.lt(zero);
-            let hits = L::narrow(hits).bits() & possible;
-            let unsure = possible & !hits & !L::narrow(misses).bits();
-            let mut decided = Decided { hits, unsure, low: [0.0; 4], high: [0.0; 4] };
-            low.store(decided.low.as_mut_ptr());
-            high.store(decided.high.as_mut_ptr());
-            decided
-        }
+/// Decides about those of the `possible` triangles of a block that f64 suffices for. There is one.
+///
+/// # Safety
+/// As [`corners_of`].
+#[inline(always)]
+pub(super) unsafe fn decide<L: Lanes>(
+    ray: &DRay,
+    block: &TriangleBlock,
+    triangles: &[DTriangle],
+    possible: u32,
+) -> Decided {
+    let [i, j, k] = AXES[largest_axis(ray.direction)];
+    // SAFETY: the processor has the instructions; there are so many numbers.
+    unsafe {
+        let (origin, direction) = (ray.origin, ray.direction);
+        let origin = splat::<L>(DVec3::new(origin[i], origin[j], origin[k]));
+        let [dx, dy, dz] = splat::<L>(DVec3::new(direction[i], direction[j], direction[k]));
+        let [a, b, c] = corners_of::<L>(block, triangles, possible);
+        let first = [a[i], a[j], a[k]];
+        let second = [b[i], b[j], b[k]];
+        let third = [c[i], c[j], c[k]];
+        let error = L::Double::splat(ERROR);
+        let zero = L::Double::splat(0.0);
+        // As in `Line::edges`.
+        let from = minus(first, origin);
+        let to_second = minus(second, origin);
+        let to_third = minus(third, origin);
+        let reach = largest(from).max(largest(to_second)).max(largest(to_third));
+        let [ax, ay] = sheared(from, [dx, dy, dz]);
+        let [bx, by] = sheared(to_second, [dx, dy, dz]);
+        let [cx, cy] = sheared(to_third, [dx, dy, dz]);
+        let spread = largest([ax, bx, cx]).max(largest([ay, by, cy]));
+        let coordinate_error = reach * dz.abs() * error;
+        let bound = coordinate_error * (spread + coordinate_error);
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let least = u.min(v).min(w);
+        let most = u.max(v).max(w);
+        let below = zero - bound;
+        let is_inside = bound.lt(least) | most.lt(below);
+        let is_outside = least.lt(below) & bound.lt(most);
+        let sides = [minus(second, first), minus(third, first)];
+        let (t, slack, is_known) = plane(from, [dx, dy, dz], sides);
+        let low = t - slack;
+        let high = t + slack;
+        let hits = is_inside & is_known & zero.le(low);
+        let misses = is_outside | is_inside & is_known & high.lt(zero);
+        let hits = L::narrow(hits).bits() & possible;
+        let unsure = possible & !hits & !L::narrow(misses).bits();
+        let mut decided = Decided { hits, unsure, low: [0.0; 4], high: [0.0; 4] };
+        low.store(decided.low.as_mut_ptr());
+        high.store(decided.high.as_mut_ptr());
+        decided
     }
 }
 
 /// A component of a vector in every lane, by axis.
-type Vector<D> = [D; 3];
+pub(super) type Vector<D> = [D; 3];
 
 // These are functions, since closures may not be compiled with the instructions.
 
 #[inline(always)]
-unsafe fn splat<L: Lanes>(point: DVec3) -> Vector<L::Double> {
+pub(super) unsafe fn splat<L: Lanes>(point: DVec3) -> Vector<L::Double> {
     // SAFETY: the processor has the instructions.
     unsafe { [L::Double::splat(point.x), L::Double::splat(point.y), L::Double::splat(point.z)] }
-}
-
-#[inline(always)]
-unsafe fn load<L: Lanes>(
-    axes: &[[f64; TriangleBlock::LANES]; 3],
-    [i, j, k]: [usize; 3],
-) -> Vector<L::Double> {
-    // SAFETY: the processor has the instructions; there are so many numbers.
-    unsafe {
-        [
-            L::Double::load(axes[i].as_ptr()),
-            L::Double::load(axes[j].as_ptr()),
-            L::Double::load(axes[k].as_ptr()),
-        ]
-    }
 }
 
 #[inline(always)]
@@ -152,16 +128,6 @@ fn sheared<D: DoubleLanes>([x, y, z]: Vector<D>, [dx, dy, dz]: Vector<D>) -> [D;
 #[inline(always)]
 fn dot<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> D {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn difference<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> [Twice<D>; 3] {
-    [Twice::difference(a[0], b[0]), Twice::difference(a[1], b[1]), Twice::difference(a[2], b[2])]
-}
-
-#[inline(always)]
-fn larger<D: DoubleLanes>([x, y, z]: &[Twice<D>; 3]) -> Vector<D> {
-    [x.0, y.0, z.0]
 }
 
 /// Returns the distances of planes, their errors, and where they are known, as in `Line::plane`: by
@@ -188,75 +154,88 @@ fn plane<D: DoubleLanes>(
     (t, slack.filled(0.25) * slack / along.abs(), along_error.le(along.abs()))
 }
 
-/// Rays with the triangles that they hit, side by side.
-pub(super) struct Distances {
-    /// Of the rays' origins and directions, and of the triangles' corners.
-    rows: [[f64; Self::COUNT]; 15],
-}
+/// The most rays that one register needs.
+pub(super) const RAYS: usize = 16;
 
-impl Distances {
-    /// The most that one register needs.
-    pub(super) const COUNT: usize = 16;
-    pub(super) const EMPTY: Self = Self { rows: [[0.0; Self::COUNT]; 15] };
-
-    #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, ray: &DRay, triangle: &DTriangle) {
-        let DTriangle([a, b, c]) = *triangle;
-        for (i, point) in [ray.origin, ray.direction, a, b, c].into_iter().enumerate() {
-            (0..3).for_each(|axis| self.rows[3 * i + axis][lane] = point[axis]);
+/// Returns the numbers of as many places as there are lanes, side by side.
+///
+/// # Safety
+/// The processor has the instructions; there are `N` numbers at a place per lane.
+#[inline(always)]
+pub(super) unsafe fn gathered<D: DoubleLanes, const N: usize, const P: usize>(
+    from: &[*const f64; P],
+) -> [D; N] {
+    // SAFETY: the processor has the instructions; so many numbers are there.
+    unsafe {
+        let mut numbers = [D::splat(0.0); N];
+        for first in (0..N).step_by(2) {
+            let first = first.min(N - 2);
+            let [a, b] = D::load_twos(&from.map(|from| from.wrapping_add(first)));
+            numbers[first] = a;
+            numbers[first + 1] = b;
         }
-    }
-
-    /// Returns the rounded distances, and a bit for each that is decided.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`.
-    #[inline(always)]
-    pub(super) unsafe fn rounded<L: Lanes>(&self) -> ([f64; Self::COUNT], u32) {
-        // SAFETY: the processor has the instructions; there are so many numbers.
-        unsafe {
-            let mut points = [[L::Double::splat(0.0); 3]; 5];
-            for (point, rows) in points.iter_mut().zip(self.rows.as_chunks::<3>().0) {
-                for (coordinate, row) in point.iter_mut().zip(rows) {
-                    *coordinate = L::Double::load(row.as_ptr());
-                }
-            }
-            rounded::<L>(points)
-        }
+        numbers
     }
 }
 
-/// Returns the rounded distance of one hit, if it is decided.
+/// Returns the rounded distances of rays and the triangles that they hit, and a bit for each that is
+/// decided.
+///
+/// # Safety
+/// The processor has the instructions; there are a ray and a triangle per lane.
+#[inline(always)]
+pub(super) unsafe fn rounded_distances<L: Lanes>(
+    rays: &[*const DRay; RAYS],
+    triangles: &[*const DTriangle; RAYS],
+) -> ([f64; RAYS], u32) {
+    // SAFETY: the processor has the instructions; these are numbers.
+    unsafe {
+        let [x, y, z, dx, dy, dz] = gathered(&rays.map(|ray| ray.cast()));
+        let [ax, ay, az, bx, by, bz, cx, cy, cz] =
+            gathered(&triangles.map(|triangle| triangle.cast()));
+        rounded::<L>([x, y, z], [dx, dy, dz], [[ax, ay, az], [bx, by, bz], [cx, cy, cz]], None)
+    }
+}
+
+/// Returns the rounded distance of one hit, if it is decided. The time is that of a chain of dependent
+/// operations, which is shorter from the bounds that the hit has already.
 ///
 /// # Safety
 /// The processor has the instructions of `L`.
 #[inline(always)]
-pub(super) unsafe fn rounded_distance<L: Lanes>(ray: &DRay, triangle: &DTriangle) -> Option<f64> {
+pub(super) unsafe fn rounded_distance<L: Lanes>(
+    ray: &DRay,
+    triangle: &DTriangle,
+    hit: &NearestHit,
+) -> Option<f64> {
     let DTriangle([a, b, c]) = *triangle;
     // SAFETY: the processor has the instructions.
     let (distances, is_decided) = unsafe {
         let [origin, direction] = [splat::<L>(ray.origin), splat::<L>(ray.direction)];
-        rounded::<L>([origin, direction, splat::<L>(a), splat::<L>(b), splat::<L>(c)])
+        let nearly = L::Double::splat(0.5 * (hit.low + hit.high));
+        let corners = [splat::<L>(a), splat::<L>(b), splat::<L>(c)];
+        rounded::<L>(origin, direction, corners, Some(nearly))
     };
     (is_decided & 1 != 0).then_some(distances[0])
 }
 
-/// Returns the rounded distances of rays by their origins, directions and the corners of triangles,
-/// and a bit for each that is decided.
 #[inline(always)]
 unsafe fn rounded<L: Lanes>(
-    [origin, direction, a, b, c]: [[L::Double; 3]; 5],
-) -> ([f64; Distances::COUNT], u32) {
-    const { assert!(L::N <= Distances::COUNT) };
-    let (corner, p, q) = (difference(a, origin), difference(b, a), difference(c, a));
-    let Twice(high, low) = distance(&corner, &direction, &p, &q);
-    let sides = [larger(&p), larger(&q)];
-    let (_, slack, is_known) = plane(larger(&corner), direction, sides);
-    let slack = slack * slack.filled(NARROWER);
-    let rounded = high + (low + slack);
-    let is_decided = is_known & rounded.eq(high + (low - slack));
-    let mut distances = [0.0; Distances::COUNT];
+    origin: Vector<L::Double>,
+    direction: Vector<L::Double>,
+    [a, b, c]: [Vector<L::Double>; 3],
+    nearly: Option<L::Double>,
+) -> ([f64; RAYS], u32) {
+    const { assert!(L::N <= RAYS) };
+    let [low, high] =
+        distance(difference(a, origin), direction, difference(b, a), difference(c, a), nearly);
+    let mut distances = [0.0; RAYS];
     // SAFETY: there is room. Adding 0 turns −0 into +0.
-    unsafe { (rounded + rounded.filled(0.0)).store(distances.as_mut_ptr()) };
-    (distances, L::narrow(is_decided).bits())
+    unsafe { (low + low.filled(0.0)).store(distances.as_mut_ptr()) };
+    (distances, L::narrow(low.eq(high)).bits())
+}
+
+#[inline(always)]
+fn difference<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> [Twice<D>; 3] {
+    [Twice::difference(a[0], b[0]), Twice::difference(a[1], b[1]), Twice::difference(a[2], b[2])]
 }

@@ -352,7 +352,8 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                 let at = |k: usize| hopeful[(i + k).min(hopeful.len() - 1)].traversal;
                 let four = [at(0), at(1), at(2), at(3)];
                 let bounded = bounds::<K::Rays>(self.wide, four);
-                for (traversal, bounded) in four.into_iter().zip(&bounded).take(hopeful.len() - i) {
+                let count = quarters.min(hopeful.len() - i);
+                for (traversal, bounded) in four.into_iter().zip(&bounded).take(count) {
                     let traversal = &mut *traversal;
                     let block = traversal.block(self.wide);
                     let number = traversal.ray.number as usize;

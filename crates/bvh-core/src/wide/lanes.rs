@@ -9,6 +9,7 @@ use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 pub(crate) struct Aligned<T>(pub(crate) T);
 
 /// Functions that are one expression each.
+#[allow(unused_macros)] // Some machines have no vector kernel.
 macro_rules! functions {
     ($(fn $name:ident($($parameters:tt)*) -> $result:ty = $value:expr;)*) => {$(
         #[inline(always)]
@@ -20,7 +21,7 @@ macro_rules! functions {
         }
     )*};
 }
-#[allow(unused_imports)] // Some machines have no vector kernel.
+#[allow(unused_imports)] // As above.
 pub(crate) use functions;
 
 /// `N` numbers of f32, or of u32 where an operation says so.
@@ -150,7 +151,12 @@ pub(crate) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
 
 /// One f64 per lane.
 pub(crate) trait DoubleLanes:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + BitAnd<Output = Self>
 {
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
@@ -158,6 +164,22 @@ pub(crate) trait DoubleLanes:
 
     /// As many numbers from any place as there are lanes.
     unsafe fn load(from: *const f64) -> Self;
+
+    /// Two numbers from each of at least as many places as there are lanes: the first of every
+    /// place, and the second.
+    ///
+    /// # Safety
+    /// The processor has the instructions; there are two numbers at a place per lane.
+    #[inline(always)]
+    unsafe fn load_twos(from: &[*const f64]) -> [Self; 2] {
+        let mut rows = [[0.0; 16]; 2];
+        for (lane, from) in from.iter().enumerate().take(size_of::<Self>() / size_of::<f64>()) {
+            // SAFETY: there are two numbers.
+            (rows[0][lane], rows[1][lane]) = unsafe { (**from, *from.add(1)) };
+        }
+        // SAFETY: there are as many numbers as lanes.
+        unsafe { [Self::load(rows[0].as_ptr()), Self::load(rows[1].as_ptr())] }
+    }
 
     /// Writes the numbers to any place.
     ///
@@ -177,7 +199,14 @@ pub(crate) trait DoubleLanes:
 
     #[inline(always)]
     fn abs(self) -> Self {
-        self.max(self.filled(0.0) - self)
+        self & self.filled(f64::from_bits(u64::MAX >> 1))
+    }
+
+    /// The powers of two in normal numbers above 0.
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        // Its bits are those of the exponent.
+        self & self.filled(f64::INFINITY)
     }
 
     /// One over each number, off by at most 1.2 units of 2⁻⁵³ of it.
@@ -212,5 +241,25 @@ impl<D: DoubleLanes> Numbers for D {
     #[inline(always)]
     fn two_product(self, other: Self) -> (Self, Self) {
         DoubleLanes::two_product(self, other)
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        DoubleLanes::mul_add(self, factor, term)
+    }
+
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        DoubleLanes::inverse(self)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        DoubleLanes::abs(self)
+    }
+
+    #[inline(always)]
+    fn filled(self, x: f64) -> Self {
+        DoubleLanes::filled(self, x)
     }
 }

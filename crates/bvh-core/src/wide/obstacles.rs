@@ -2,7 +2,7 @@
 
 use super::beam::Obstacles;
 use super::double::DWideBvh;
-use super::double_block::DoubleBlock;
+use super::double_block::corners_of;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::triangles::TriangleBlock;
@@ -85,7 +85,7 @@ impl Obstacles for DWideBvh {
     }
 
     fn boxed(&self, ray: &DRay) -> Ray {
-        DWideBvh::boxed(self, ray).ray
+        DWideBvh::boxed(self, ray)
     }
 
     #[inline(always)]
@@ -94,9 +94,9 @@ impl Obstacles for DWideBvh {
         block: &TriangleBlock,
         axes: [usize; 3],
     ) -> [[L::Double; 3]; 3] {
-        let block = DoubleBlock::new(block, &self.triangles);
         // SAFETY: the processor has the instructions.
-        unsafe { block.corners_along::<L>(axes) }
+        let corners = unsafe { corners_of::<L>(block, &self.triangles, block.used::<L>()) };
+        corners.map(|corner| axes.map(|axis| corner[axis]))
     }
 
     fn stops(&self, ray: &DRay, block: &TriangleBlock, lane: usize) -> bool {

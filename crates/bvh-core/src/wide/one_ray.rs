@@ -8,6 +8,7 @@ use super::layout::{Child, WideBvh};
 use super::pairs::{Crossings, Pairs};
 use super::triangles::TriangleBlock;
 use crate::exact::{AXES, largest_axis};
+use crate::slabs::FarRay;
 use crate::{Hit, Ray};
 use core::mem::MaybeUninit;
 
@@ -25,8 +26,7 @@ impl<K: Instructions, F: Filter, const ANY: bool> Task<K> for OneRay<'_, F, ANY>
     #[inline(always)]
     unsafe fn run(self) -> Hit {
         let Self { wide, ray, filter } = self;
-        let leaf_ray = MaybeUninit::<LeafRay<K::Block>>::uninit();
-        let mut leaves = FirstHits::<_, _, ANY> { ray, wide, leaf_ray, is_prepared: false, filter };
+        let mut leaves = FirstHits::<_, _, ANY> { leaf_ray: DeferredRay::new(ray, wide), filter };
         // SAFETY: the processor has the instructions of `K`.
         unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) }
     }
@@ -64,6 +64,11 @@ impl Filter for &mut dyn FnMut(Hit) -> bool {
 pub(crate) trait Leaves<K> {
     /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool;
+
+    /// Returns the ray for boxes far from which it begins.
+    fn far_ray(&self, wide: &WideBvh, ray: &Ray) -> FarRay {
+        wide.far_ray(ray)
+    }
 }
 
 /// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit
@@ -111,7 +116,7 @@ impl<K: Instructions, L: Leaves<K>, const ANY: bool> Task<K> for Rare<'_, L, ANY
             if is_near {
                 visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(&boxed), leaves, base)
             } else {
-                let boxes = FarBoxRay::new(&boxed, &wide.far_ray(ray));
+                let boxes = FarBoxRay::new(&boxed, &leaves.far_ray(wide, ray));
                 visit::<K, ANY>(wide, ray.t_max(), &boxes, leaves, base)
             }
         }
@@ -187,23 +192,16 @@ pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
 
 /// Keeps the nearest hit among those that `filter` accepts.
 struct FirstHits<'r, L, F, const ANY: bool> {
-    ray: &'r Ray,
-    wide: &'r WideBvh,
-    leaf_ray: MaybeUninit<LeafRay<L>>,
-    is_prepared: bool,
+    leaf_ray: DeferredRay<'r, L>,
     filter: F,
 }
 
 impl<K: Instructions, F: Filter, const ANY: bool> Leaves<K> for FirstHits<'_, K::Block, F, ANY> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
-        // SAFETY: the processor has the instructions; the ray is prepared before its use.
+        // SAFETY: the processor has the instructions.
         unsafe {
-            if !self.is_prepared {
-                K::call(Prepare { ray: self.ray, wide: self.wide, to: &mut self.leaf_ray });
-                self.is_prepared = true;
-            }
-            let ray = self.leaf_ray.assume_init_ref();
+            let ray = self.leaf_ray.get::<K>();
             let corners = ray.corners(block);
             let t_max = K::Block::splat(nearest.t);
             let mut candidates = ray.pairs.candidates(&corners);
@@ -246,7 +244,35 @@ impl<K: Instructions, F: Filter, const ANY: bool> Leaves<K> for FirstHits<'_, K:
     }
 }
 
-/// The preparation of a ray for triangles: most rays in the open meet none.
+/// A ray that is prepared for triangles before the first of them: most rays in the open meet none.
+pub(crate) struct DeferredRay<'r, L> {
+    ray: &'r Ray,
+    wide: &'r WideBvh,
+    leaf_ray: MaybeUninit<LeafRay<L>>,
+    is_prepared: bool,
+}
+
+impl<'r, L: Lanes> DeferredRay<'r, L> {
+    #[inline(always)]
+    pub(crate) fn new(ray: &'r Ray, wide: &'r WideBvh) -> Self {
+        Self { ray, wide, leaf_ray: MaybeUninit::uninit(), is_prepared: false }
+    }
+
+    #[inline(always)]
+    pub(crate) unsafe fn get<K: Instructions<Block = L>>(&mut self) -> &LeafRay<L> {
+        // SAFETY: the processor has the instructions; the ray is prepared before its use.
+        unsafe {
+            if !self.is_prepared {
+                let Self { ray, wide, .. } = *self;
+                K::call(Prepare { ray, wide, to: &mut self.leaf_ray });
+                self.is_prepared = true;
+            }
+            self.leaf_ray.assume_init_ref()
+        }
+    }
+}
+
+/// The preparation of a ray for triangles.
 struct Prepare<'a, L> {
     ray: &'a Ray,
     wide: &'a WideBvh,

@@ -119,13 +119,6 @@ impl<K: Instructions> Packet<K> {
                 let vector = vector.assume_init_ref();
                 vector.nearest.t.store(distances.as_mut_ptr());
                 vector.nearest.object.store(objects.as_mut_ptr().cast());
-                if F::DECIDES && !F::ANY {
-                    let known = vector.nearest.known();
-                    for (number, known) in (vector.first..).zip(known).take(K::Rays::N) {
-                        find.learn(number, known);
-                    }
-                    continue;
-                }
                 vector.first
             };
             for (lane, (&t, &object)) in distances.iter().zip(&objects).enumerate().take(K::Rays::N)
@@ -396,6 +389,9 @@ unsafe fn bound<K: Instructions, F: Find>(
             let corners = block.splat_corners::<K::Rays>(lane, vector.axes);
             let mut candidates = pairs.candidates(&corners);
             candidates.crossings.possible &= entered;
+            if candidates.crossings.possible == 0 {
+                continue;
+            }
             let nearest = &mut vector.nearest;
             let (possible, certain) = pairs.within(&candidates, nearest.t);
             if possible == 0 {
@@ -467,7 +463,7 @@ impl<K: Instructions, F: Find> Task<K> for Decide<'_, K::Rays, F> {
             };
             let number = first + ray;
             if !F::ANY {
-                find.learn(number, known[ray]);
+                find.learn(number, known(ray));
             }
             // SAFETY: the processor has the instructions; the block is one of the layout.
             let Some(hit) = (unsafe { find.decide::<K>(number, block, &bounded) }) else {

@@ -40,7 +40,7 @@ impl<L: Lanes> Nearest<L> {
     }
 
     #[inline(always)]
-    pub(super) fn known(&self) -> [Known; 16] {
+    pub(super) fn known(&self) -> impl Fn(usize) -> Known + use<L> {
         let mut numbers = [[0.0; 16]; 3];
         let [low, high, object] = &mut numbers;
         // SAFETY: there is room for sixteen lanes.
@@ -50,7 +50,7 @@ impl<L: Lanes> Nearest<L> {
             self.object.store(object.as_mut_ptr());
         }
         let [low, high, object] = numbers;
-        core::array::from_fn(|i| Known { low: low[i], high: high[i], object: object[i].to_bits() })
+        move |i| Known { low: low[i], high: high[i], object: object[i].to_bits() }
     }
 
     /// Ends rays that have their answer: before they begin. Returns whether there are any.

@@ -26,7 +26,7 @@
 //! *f32*, u = 2⁻²⁴. A difference from the origin is off by uR, its product with the slope by 3uR,
 //! and the sheared coordinate by less than 4.1uR + um < 6.3uR. The edge value is off by less than 4
 //! · 6.3uRm + 2 (6.3uR)² from its operands, and by 4um² < 8.5uRm from its own roundings: in total
-//! less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the last term of the
+//! less than E = e (m + e) with e = 36uR. Underflow adds less than 2⁻¹²⁶, the last term of the
 //! bound in the code, to an edge value, and less to a coordinate, whose e has it too. The sum m + e
 //! is the *spread*: no real |x|, |y| exceeds it. If all edge values are above E, or all below −E,
 //! the line crosses the triangle. From R = 2⁶² on products may overflow, and the bound is infinite.
@@ -45,7 +45,7 @@
 //! most 4R, roundings of the other terms are below 23uR together; where it is more, they are less
 //! than T d_z, whose sign is then right, because |t d_z| is at most R. A hit counts by its rounded
 //! distance, which is off by at most u|t|, and uR / |d_z| covers that, or by 2⁻¹⁵⁰, where it is
-//! subnormal. Hence a product beyond 8EΔ + (e + 2⁻¹²⁶|d_z|) |a| has the sign of the difference of T
+//! subnormal. Hence a product beyond 8EΔ + (64uR + 2⁻¹²⁶|d_z|) |a| has the sign of the difference of T
 //! and the rounded distance, or that difference is 0 within the range. Below R = 2⁴⁰ nothing
 //! overflows but T d_z, which then has the right sign, and its products; other rays get an infinite
 //! bound. Without the term T d_z the sum is −ta d_z, off by no more: divided by |a d_z| with five
@@ -82,7 +82,10 @@ use crate::ray::pow2;
 use crate::{PreparedRay, Ray, Triangle};
 
 /// e of f32, in multiples of R.
-const SINGLE_ERROR: f32 = 64.0 * (f32::EPSILON / 2.0);
+const SINGLE_ERROR: f32 = 36.0 * (f32::EPSILON / 2.0);
+
+/// The error of a distance times the depth, without the tilt's, in multiples of R.
+const RANGE_ERROR: f32 = 64.0 * (f32::EPSILON / 2.0);
 
 /// The rays of the pairs. Vectors, of corners too, are in the shear's order of axes: the
 /// direction's largest component is the last.
@@ -179,7 +182,8 @@ impl<L: Lanes> Pairs<L> {
         // The least normal number, because arithmetic with subnormal ones is slow.
         let least = reach.filled(f32::MIN_POSITIVE);
         let error = reach.mul_add(reach.filled(SINGLE_ERROR), least);
-        let range_error = depth.abs().mul_add(least, error);
+        let range_error = reach.mul_add(reach.filled(RANGE_ERROR), least);
+        let range_error = depth.abs().mul_add(least, range_error);
         let or_infinite = |bound: L, below: f32| {
             L::select(reach.lt(reach.filled(below)), bound, reach.filled(f32::INFINITY))
         };

@@ -56,7 +56,7 @@ operators! {
     Sub sub subtract subtract_double,
     Mul mul multiply multiply_double,
     Div div divide divide_double,
-    BitAnd bitand and,
+    BitAnd bitand and and_double,
     BitOr bitor or,
     BitXor bitxor xor,
 }

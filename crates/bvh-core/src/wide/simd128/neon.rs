@@ -29,6 +29,7 @@ macro_rules! functions {
 
 functions! {
     fn and(a: Single, b: Single) -> Single = transmute(vandq_u32(transmute(a), transmute(b)));
+    fn and_double(a: Double, b: Double) -> Double = transmute(vandq_u64(transmute(a), transmute(b)));
     fn or(a: Single, b: Single) -> Single = transmute(vorrq_u32(transmute(a), transmute(b)));
     fn xor(a: Single, b: Single) -> Single = transmute(veorq_u32(transmute(a), transmute(b)));
     fn below(a: Single, b: Single) -> Single = transmute(vcltq_u32(transmute(a), transmute(b)));

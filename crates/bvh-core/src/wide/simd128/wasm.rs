@@ -9,8 +9,8 @@ pub(super) use core::arch::wasm32::{
     f64x2_div as divide_double, f64x2_eq as eq_double, f64x2_le as le_double,
     f64x2_lt as lt_double, f64x2_mul as multiply_double, f64x2_promote_low_f32x4 as double_low,
     f64x2_splat as splat_double, f64x2_sub as subtract_double, u32x4_lt as below, v128 as Single,
-    v128 as Double, v128_and as and, v128_bitselect as select, v128_bitselect as select_double,
-    v128_or as or, v128_xor as xor,
+    v128 as Double, v128_and as and, v128_and as and_double, v128_bitselect as select,
+    v128_bitselect as select_double, v128_or as or, v128_xor as xor,
 };
 
 /// Functions that are one expression each.

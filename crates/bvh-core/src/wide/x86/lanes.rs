@@ -102,7 +102,8 @@ operators!(F32x16: Add add _mm512_add_ps, Sub sub _mm512_sub_ps, Mul mul _mm512_
     BitAnd bitand _mm512_and_ps, BitOr bitor _mm512_or_ps, BitXor bitxor _mm512_xor_ps);
 operators!(F64x4: Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd,
     BitAnd bitand _mm256_and_pd, BitOr bitor _mm256_or_pd);
-operators!(F64x8: Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd);
+operators!(F64x8: Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd,
+    BitAnd bitand _mm512_and_pd);
 
 impl Lanes for F32x4 {
     const N: usize = 4;
@@ -247,6 +248,14 @@ impl Lanes for F32x16 {
 impl DoubleLanes for F64x4 {
     type Mask = Self;
     memory!(f64: _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd);
+    #[inline(always)]
+    unsafe fn load_twos(from: &[*const f64]) -> [Self; 2] {
+        unsafe {
+            let even = _mm256_loadu2_m128d(from[2], from[0]);
+            let odd = _mm256_loadu2_m128d(from[3], from[1]);
+            [Self(_mm256_unpacklo_pd(even, odd)), Self(_mm256_unpackhi_pd(even, odd))]
+        }
+    }
     functions! {
         fn min(self, b: Self) -> Self = Self(_mm256_min_pd(self.0, b.0));
         fn max(self, b: Self) -> Self = Self(_mm256_max_pd(self.0, b.0));
@@ -274,6 +283,13 @@ impl DoubleLanes for F64x8 {
             Self(_mm512_fmadd_pd(_mm512_fnmadd_pd(self.0, x, one), x, x))
         }
     }
+    #[inline(always)]
+    unsafe fn load_twos(from: &[*const f64]) -> [Self; 2] {
+        unsafe {
+            let Two([first, second], [third, fourth]) = load_halves::<F64x4>(from);
+            [Self(joined(first, third)), Self(joined(second, fourth))]
+        }
+    }
     functions! {
         fn min(self, b: Self) -> Self = Self(_mm512_min_pd(self.0, b.0));
         fn max(self, b: Self) -> Self = Self(_mm512_max_pd(self.0, b.0));
@@ -299,6 +315,18 @@ macro_rules! of_halves {
     )*};
 }
 
+/// Two numbers from each of as many places as two registers have lanes.
+#[inline(always)]
+unsafe fn load_halves<T: DoubleLanes>(from: &[*const f64]) -> Two<[T; 2]> {
+    let lanes = size_of::<T>() / size_of::<f64>();
+    unsafe { Two(T::load_twos(from), T::load_twos(&from[lanes..])) }
+}
+
+#[inline(always)]
+unsafe fn joined(low: F64x4, high: F64x4) -> __m512d {
+    unsafe { _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low.0), high.0) }
+}
+
 of_halves!(Add add, Sub sub, Mul mul, Div div, BitAnd bitand, BitOr bitor);
 
 impl<T: DoubleLanes> DoubleLanes for Two<T> {
@@ -310,6 +338,11 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
     #[inline(always)]
     unsafe fn load(from: *const f64) -> Self {
         unsafe { Self(T::load(from), T::load(from.cast::<T>().add(1).cast())) }
+    }
+    #[inline(always)]
+    unsafe fn load_twos(from: &[*const f64]) -> [Self; 2] {
+        let Two([first, second], [third, fourth]) = unsafe { load_halves::<T>(from) };
+        [Self(first, third), Self(second, fourth)]
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
