@@ -199,8 +199,9 @@ const TRIALS: usize = 4;
 /// from which on testing every ray pays.
 const LEAST_PRUNED: f32 = 0.3;
 
-/// The work for each ray, about in cycles, from which on points are so far apart that fans take less.
-const MOST_WORK: u64 = 70;
+/// The work for each ray of a fan, about in cycles, and that of a fan: points whose beams take more
+/// are far apart.
+const WORK_OF_FANS: [usize; 2] = [50, 3500];
 
 /// The tracing of beams by a vector kernel.
 struct Trace<'a, O: Obstacles> {
@@ -228,11 +229,12 @@ impl<K: Instructions, O: Obstacles> Task<K> for Trace<'_, O> {
             let group = Group::<K>::new(beams, origins);
             let mut beam = Beam::new(&group, beams);
             let mut bundle = Bundle::new(beams.obstacles);
-            let most = MOST_WORK * (TRIALS * origins.len()) as u64;
+            let [of_ray, of_fan] = WORK_OF_FANS;
+            let most = (of_ray + of_fan / numbers.len().max(1)) * TRIALS * origins.len();
             let mut others = numbers;
             while let [number, rest @ ..] = others {
                 if numbers.len() - others.len() == TRIALS {
-                    if bundle.work > most {
+                    if bundle.work > most as u64 {
                         break;
                     }
                     bundle.is_strict = bundle.pruned as f32 > LEAST_PRUNED * bundle.tested as f32;
