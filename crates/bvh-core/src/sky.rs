@@ -2,11 +2,10 @@
 //!
 //! Urban climate, daylight and comfort studies ask for 10⁵ to 10⁶ points which of hundreds of
 //! directions are free. The rays need not exist one by one: neighbouring points look along a
-//! direction together, as a beam.
+//! direction together, as a beam, and a point far from others in many directions, as a fan.
 
 use crate::Traced;
-use crate::exact::largest_axis;
-use crate::wide::POINTS_OF_BEAM;
+use crate::wide::{POINTS_OF_BEAM, transpose};
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use core::num::NonZeroU32;
 use glam::DVec3;
@@ -68,31 +67,38 @@ pub struct View<'a, P> {
 /// Returns the numbers of points in an order in which neighbours follow each other: the order of the
 /// leaves of a tree that halves them along their longest extent. O(n log n) time.
 pub fn neighbours<P: Copy + Into<DVec3>>(points: &[P]) -> Vec<u32> {
-    let points: Vec<DVec3> = points.iter().map(|&point| point.into()).collect();
-    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    let at = |point: &P| (*point).into();
+    let low = points.iter().map(at).fold(DVec3::INFINITY, DVec3::min);
+    // The bits of numbers from 0 on are in the order of the numbers.
+    let bits = |point: &P| (at(point) - low).as_vec3().to_array().map(f32::to_bits);
+    let mut points: Vec<([u32; 3], u32)> = points.iter().map(bits).zip(0..).collect();
     // Pairs of a beginning and an end.
-    let mut open = vec![(0, order.len())];
+    let mut open = vec![(0, points.len())];
     while let Some((from, to)) = open.pop() {
         let count = to - from;
         if count <= FEW {
             continue;
         }
-        let numbers = &mut order[from..to];
-        let at = |&number: &u32| points[number as usize];
-        let low = numbers.iter().map(at).fold(DVec3::INFINITY, DVec3::min);
-        let high = numbers.iter().map(at).fold(DVec3::NEG_INFINITY, DVec3::max);
-        let axis = largest_axis(high - low);
+        let points = &mut points[from..to];
+        let mut least = [u32::MAX; 3];
+        let mut most = [0; 3];
+        for (place, _) in &*points {
+            for axis in 0..3 {
+                least[axis] = least[axis].min(place[axis]);
+                most[axis] = most[axis].max(place[axis]);
+            }
+        }
+        let [x, y, z] = [0, 1, 2].map(|k| f32::from_bits(most[k]) - f32::from_bits(least[k]));
+        let axis = if z > x.max(y) { 2 } else { usize::from(y > x) };
         // Beams begin at multiples of their size, and end between halves.
         let unit = if count > POINTS_OF_BEAM { POINTS_OF_BEAM } else { FEW };
         let middle = (count / 2).div_ceil(unit) * unit;
-        let key = |&number: &u32| (points[number as usize][axis], number);
-        numbers.select_nth_unstable_by(middle, |a, b| {
-            let ((a, first), (b, second)) = (key(a), key(b));
-            a.total_cmp(&b).then(first.cmp(&second))
+        points.select_nth_unstable_by_key(middle, |(place, number)| {
+            u64::from(place[axis]) << 32 | u64::from(*number)
         });
         open.extend([(from + middle, to), (from, from + middle)]);
     }
-    order
+    points.into_iter().map(|(_, number)| number).collect()
 }
 
 /// The number of points whose order does not matter.
@@ -225,6 +231,7 @@ impl Sky {
         let mut points = Vec::with_capacity(POINTS_OF_BEAM);
         let mut normals = Vec::with_capacity(POINTS_OF_BEAM);
         let mut rows = vec![0; POINTS_OF_BEAM * words];
+        let mut free = vec![0; 64 * words];
         for numbers in order.chunks(POINTS_OF_BEAM) {
             let at = |from: &[L::Point], to: &mut Vec<L::Point>| {
                 to.clear();
@@ -233,15 +240,16 @@ impl Sky {
             at(view.points, &mut points);
             view.normals.iter().for_each(|from| at(from, &mut normals));
             let above = view.normals.map(|_| &normals[..]);
-            rows.fill(0);
+            free.fill(0);
             layout.look(&points, above, &directions, range, &mut |direction, bits| {
-                let mut bits = bits;
-                while bits != 0 {
-                    let point = bits.trailing_zeros() as usize;
-                    rows[point * words + direction / 64] |= 1 << (direction % 64);
-                    bits &= bits - 1;
-                }
+                free[direction] = bits;
             });
+            for (word, free) in free.as_chunks_mut().0.iter_mut().enumerate() {
+                transpose(free);
+                for (row, &bits) in rows.chunks_exact_mut(words).zip(&*free) {
+                    row[word] = bits;
+                }
+            }
             for (place, &number) in numbers.iter().enumerate() {
                 row(number as usize, &rows[place * words..][..words]);
             }

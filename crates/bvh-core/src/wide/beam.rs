@@ -12,12 +12,28 @@
 //! ```
 //!
 //! The coefficients are computed once for a beam, in f64, and rounded to f32. A ray then takes eight
-//! fused operations, a product and a difference, instead of thirty. Boxes are tested twice: all
-//! children of a node against each vector of rays by interval arithmetic, as in
-//! [`packet`](super::packet), then a leaf's box against every ray of the vectors that may enter it.
-//! Only the vectors that may enter a child go on to its children.
+//! fused operations, a product and a difference, instead of thirty.
 //!
-//! # The bounds
+//! # Boxes
+//!
+//! For two axes a and b, p_a d_b − p_b d_a is the same along a ray, its *place* for this pair. The line
+//! of a ray meets a box if for all three pairs its place is between the least and the greatest of the
+//! box, and the ray meets it if besides it begins before the box's far planes and ends behind the
+//! near ones. These are the conditions of slabs, multiplied out. They bound the rays of a vector more
+//! tightly than intervals of their origins: places of rays from a street that runs along the direction
+//! differ little.
+//!
+//! Coordinates are relative to the middle of the points and scaled by a power of two, so that they
+//! are at most 1 in the scene; axes are turned so that the direction d has no negative component, and
+//! its greatest is 1. With u = 2⁻²⁴, coordinates are off by u, and so the places of points and planes by
+//! 2u each, and by 4u and 5u more from their products, differences and pads. A direction in a frame and
+//! its quotient are off by 2u of each component, which moves the place at a hit by 8u, and the
+//! origin in a frame by 2u beyond what pads the planes, which moves it by 4u. The pad of 32u is greater
+//! than all together. Rays that begin before a plane do so in relative coordinates, too, since all
+//! are rounded monotonically by the same operation. The end of a ray is compared along one axis, with
+//! 32u and with 32u of the range.
+//!
+//! # The bounds of triangles
 //!
 //! Coordinates are scaled by a power of two, so that relative ones are at most 1. With u = 2⁻²⁴ and
 //! ε = 2⁻⁵³, let m be the largest |x|, |y| of the sheared corners, H_x and H_y half the extents of the
@@ -49,28 +65,30 @@
 //! # Far apart
 //!
 //! Where the points of a beam are far apart, many vectors may enter boxes that none of their rays
-//! enter. There every ray is tested against the boxes of inner nodes, too, and farther apart rays one
-//! by one take less work. The first beams tell both.
+//! enter. There every ray is tested against the boxes of inner nodes, too, and farther apart
+//! [fans](super::fan) take less work. The first beams tell both.
 
+use super::bundle::{Bundle, RAYS, Shape, VECTORS};
+use super::fan::{Fan, Pencil};
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{Kernel, SPARE, STACK, deep_stacks};
 use super::lanes::{Aligned, DoubleLanes, Lanes, Mask};
-use super::layout::{Child, WideBvh, WideNode};
+use super::layout::{WideBvh, WideNode};
+use super::ray_lanes::least as least_of;
 use super::triangles::TriangleBlock;
 use super::vector;
 use crate::double::largest_axis;
 use crate::exact::AXES;
 use crate::ray::pow2;
-use crate::slabs::{FAR, NEAR};
-use crate::{Aabb, Ray};
+use crate::{Aabb, Ray, neighbours};
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
 
 /// The maximum number of points of a beam.
-pub(crate) const POINTS: usize = 64;
+pub(crate) const POINTS: usize = RAYS;
 
-/// The maximum number of vectors of a beam.
-const VECTORS: usize = POINTS / 4;
+/// The maximum number of rays of a vector.
+pub(super) const LANES: usize = 16;
 
 /// The triangles that stop beams, in f32 or f64, laid out.
 pub(crate) trait Obstacles {
@@ -122,7 +140,7 @@ pub(crate) struct Beams<'a, O: Obstacles> {
 impl<O: Obstacles> Beams<'_, O> {
     /// Passes for each direction its number and a bit for each point from which it is free.
     pub(crate) fn trace(&self, free: &mut dyn FnMut(usize, u64)) {
-        let numbers = spread(self.directions.len());
+        let numbers = trials_first(self.directions.len());
         let wide = self.obstacles.boxes();
         let boxed = |&point: &O::Point| {
             let ray = self.obstacles.ray(point, DVec3::X, self.range);
@@ -135,8 +153,7 @@ impl<O: Obstacles> Beams<'_, O> {
         }
         let task = Trace { beams: self, origins: &origins, numbers: &numbers, free };
         // SAFETY: a layout's kernel is available.
-        let traced = unsafe { vector::dispatch(wide.kernel, task) };
-        self.trace_alone(&numbers[traced..], free);
+        unsafe { vector::dispatch::<_, ()>(wide.kernel, task) };
     }
 
     /// Traces ray by ray in the directions of these numbers.
@@ -162,25 +179,17 @@ impl<O: Obstacles> Beams<'_, O> {
 
     /// Returns whether a direction is above the surface at a point.
     #[inline(always)]
-    fn is_above(&self, point: usize, direction: DVec3) -> bool {
+    pub(super) fn is_above(&self, point: usize, direction: DVec3) -> bool {
         // A tiny normal counts, too.
         self.normals.is_none_or(|normals| normals[point].into().dot(direction) > 0.0)
     }
 }
 
-/// Returns the numbers of directions in an order of which every beginning is spread over all of
-/// them: by steps of about the golden section.
-fn spread(count: usize) -> Vec<u32> {
-    let is_coprime = |&step: &usize| {
-        let (mut a, mut b) = (step, count);
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        a == 1
-    };
-    let step = (count * 5 / 13..count).find(is_coprime).unwrap_or(1);
-    let [count, step] = [count as u64, step as u64];
-    (0..count).map(|number| (number * step % count) as u32).collect()
+/// Returns the numbers of directions, first those of trials, which are spread over all of them.
+fn trials_first(count: usize) -> Vec<u32> {
+    let mut numbers: Vec<u32> = (0..count as u32).collect();
+    numbers.sort_by_key(|&number| number as usize * TRIALS % count >= TRIALS);
+    numbers
 }
 
 /// The number of beams that tell how the others of the same points are traced.
@@ -190,9 +199,9 @@ const TRIALS: usize = 4;
 /// from which on testing every ray pays.
 const LEAST_PRUNED: f32 = 0.3;
 
-/// The work for each ray, about in cycles, from which on points are so far apart that their rays are
-/// traced one by one.
-const MOST_WORK: u64 = 330;
+/// The work for each ray of a fan, about in cycles, and that of a fan: points whose beams take more
+/// are far apart.
+const WORK_OF_FANS: [usize; 2] = [50, 3500];
 
 /// The tracing of beams by a vector kernel.
 struct Trace<'a, O: Obstacles> {
@@ -205,43 +214,99 @@ struct Trace<'a, O: Obstacles> {
 }
 
 impl<K: Instructions, O: Obstacles> Task<K> for Trace<'_, O> {
-    /// The number of directions that were traced.
-    type Output = usize;
+    type Output = ();
 
     #[inline(always)]
-    unsafe fn run(self) -> usize {
+    unsafe fn run(self) {
         let Self { beams, origins, numbers, free } = self;
-        let wide = beams.obstacles.boxes();
         // SAFETY: the processor has the instructions; the stack has room for `stack_need` children
         // and one register more.
         unsafe {
-            let group = Group::<K>::new(beams, origins);
             let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
-            let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
+            let mut deep = deep_stacks::<Pending>(1, beams.obstacles.boxes().stack_need);
             let base =
                 deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
-            let mut work = 0;
-            let [mut tested, mut pruned] = [0; 2];
-            for (place, &number) in numbers.iter().enumerate() {
-                let most = MOST_WORK * (TRIALS * origins.len()) as u64;
-                if place == TRIALS && work > most {
-                    return place;
+            let group = Group::<K>::new(beams, origins);
+            let mut beam = Beam::new(&group, beams);
+            let mut bundle = Bundle::new(beams.obstacles);
+            let [of_ray, of_fan] = WORK_OF_FANS;
+            let most = (of_ray + of_fan / numbers.len().max(1)) * TRIALS * origins.len();
+            let mut others = numbers;
+            while let [number, rest @ ..] = others {
+                if numbers.len() - others.len() == TRIALS {
+                    if bundle.work > most as u64 {
+                        break;
+                    }
+                    bundle.is_strict = bundle.pruned as f32 > LEAST_PRUNED * bundle.tested as f32;
                 }
-                let direction = beams.directions[number as usize];
-                let mut beam = Beam::new(&group, beams, direction);
-                beam.is_strict = place < TRIALS || pruned as f32 > LEAST_PRUNED * tested as f32;
-                if let Some(root) = wide.root {
-                    beam.traverse(root, base);
-                }
-                work += beam.work;
-                if place < TRIALS {
-                    tested += beam.tested;
-                    pruned += beam.pruned;
-                }
-                free(number as usize, beam.free());
+                let direction = beams.directions[*number as usize];
+                beam.aim(direction);
+                let is_above = |&point: &usize| beams.is_above(point, direction);
+                let rays = bits(origins.len(), beams.normals.is_none(), is_above);
+                free(*number as usize, bundle.trace::<K>(&beam, rays, base));
+                others = rest;
             }
-            numbers.len()
+            bundle.is_strict = true;
+            for octant in octants(beams, others) {
+                for numbers in octant.chunks(RAYS) {
+                    let fan = Fan::<K>::new(beams, numbers);
+                    let mut seen = [0; RAYS];
+                    for (point, &origin) in origins.iter().enumerate() {
+                        let is_above = |&ray: &usize| {
+                            beams.is_above(point, beams.directions[numbers[ray] as usize])
+                        };
+                        let rays = bits(numbers.len(), beams.normals.is_none(), is_above);
+                        let pencil = Pencil::new(&fan, beams, point, origin);
+                        seen[point] = bundle.trace::<K>(&pencil, rays, base);
+                    }
+                    transpose(&mut seen);
+                    for (&number, &points) in numbers.iter().zip(&seen) {
+                        free(number as usize, points);
+                    }
+                }
+            }
         }
+    }
+}
+
+/// Returns a bit for each number below `count`, of which `holds` is true unless it is for all.
+#[inline(always)]
+fn bits(count: usize, for_all: bool, holds: impl Fn(&usize) -> bool) -> u64 {
+    match for_all {
+        true => u64::MAX >> (RAYS - count),
+        false => (0..count).filter(holds).map(|number| 1 << number).sum(),
+    }
+}
+
+/// Returns the numbers of directions by the octants of the boxes that they run in, neighbours next to
+/// each other.
+fn octants<O: Obstacles>(beams: &Beams<'_, O>, numbers: &[u32]) -> [Vec<u32>; 8] {
+    let mut octants: [Vec<u32>; 8] = Default::default();
+    for &number in numbers {
+        let direction = beams.directions[number as usize];
+        let ray = beams.obstacles.ray(beams.points[0], direction, beams.range);
+        let inverse = beams.obstacles.boxed(&ray).inverse_direction();
+        octants[inverse.is_negative_bitmask() as usize].push(number);
+    }
+    octants.map(|numbers| {
+        let unit = |&number: &u32| beams.directions[number as usize].normalize();
+        let units: Vec<DVec3> = numbers.iter().map(unit).collect();
+        neighbours(&units).into_iter().map(|place| numbers[place as usize]).collect()
+    })
+}
+
+/// Turns rows of bits into columns: bit `i` of number `j` into bit `j` of number `i`.
+pub(crate) fn transpose(bits: &mut [u64; RAYS]) {
+    let mut size = RAYS / 2;
+    let mut low = u64::MAX >> size;
+    while size != 0 {
+        for i in (0..RAYS).filter(|i| i & size == 0) {
+            let swapped = (bits[i] >> size ^ bits[i + size]) & low;
+            bits[i] ^= swapped << size;
+            bits[i + size] ^= swapped;
+        }
+        size /= 2;
+        low ^= low << size;
     }
 }
 
@@ -253,9 +318,15 @@ struct Group<K: Instructions> {
     /// The largest relative coordinates.
     half: Vec3,
     relative: [[K::Rays; 3]; VECTORS],
-    /// As boxes are tested with them, and the extremes of each vector.
-    origins: [[K::Rays; 3]; VECTORS],
+    /// The same for boxes.
+    box_centre: Vec3,
+    box_scale: f32,
+    places: [[K::Rays; 3]; VECTORS],
+    /// The places of each lane, vector by vector.
+    columns: [[K::Rays; 3]; LANES],
+    /// The least and the greatest place of each vector, and of all, by axis.
     bounds: [Aabb; VECTORS],
+    whole: Aabb,
     /// The number of vectors.
     count: usize,
 }
@@ -263,6 +334,7 @@ struct Group<K: Instructions> {
 impl<K: Instructions> Group<K> {
     #[inline(always)]
     unsafe fn new<O: Obstacles>(beams: &Beams<'_, O>, origins: &[Vec3]) -> Self {
+        const { assert!(POINTS / VECTORS <= K::Rays::N && K::Rays::N <= LANES) };
         let points = || beams.points.iter().map(|&point| O::point(point));
         let min = points().fold(DVec3::INFINITY, DVec3::min);
         let max = points().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -271,26 +343,34 @@ impl<K: Instructions> Group<K> {
         let reach = beams.obstacles.reach(centre).max(half.max_element());
         let scale = power_below(1.0 / reach);
         let last = beams.points.len() - 1;
+        let around = Aabb::around(origins.iter().copied());
+        let box_centre = around.min * 0.5 + around.max * 0.5;
+        let all = beams.obstacles.boxes().root_box().union(&around);
+        let reach = (all.max - box_centre).max(box_centre - all.min).max_element();
+        let box_scale = power_below(1.0 / f64::from(reach.max(pow2(-100)))) as f32;
+        let box_centre = box_centre * box_scale;
         // SAFETY: the processor has the instructions; there are aligned lanes.
         unsafe {
-            let none = [[K::Rays::splat(0.0); 3]; VECTORS];
+            let none = [K::Rays::splat(0.0); 3];
             let count = beams.points.len().div_ceil(K::Rays::N);
             let mut group = Self {
                 centre,
                 scale,
                 // Rounded up.
                 half: (half * scale).as_vec3() * (1.0 + 2.0 * f32::EPSILON),
-                relative: none,
-                origins: none,
+                relative: [none; VECTORS],
+                box_centre,
+                box_scale,
+                places: [none; VECTORS],
+                columns: [none; LANES],
                 bounds: [Aabb::EMPTY; VECTORS],
+                whole: Aabb::EMPTY,
                 count,
             };
-            for (vector, origins) in origins.chunks(K::Rays::N).enumerate() {
-                group.bounds[vector] = Aabb::around(origins.iter().copied());
-            }
+            let mut places = Aligned([[[0.0; LANES]; 3]; VECTORS]);
             for vector in 0..count {
                 for axis in 0..3 {
-                    let mut lanes = Aligned([[0.0; 16]; 2]);
+                    let mut lanes = Aligned([[0.0; LANES]; 2]);
                     for lane in 0..K::Rays::N {
                         let point = (vector * K::Rays::N + lane).min(last);
                         let relative = O::point(beams.points[point])[axis] - centre[axis];
@@ -298,16 +378,32 @@ impl<K: Instructions> Group<K> {
                         lanes.0[1][lane] = origins[point][axis];
                     }
                     group.relative[vector][axis] = K::Rays::load(lanes.0[0].as_ptr());
-                    group.origins[vector][axis] = K::Rays::load(lanes.0[1].as_ptr());
+                    let place = K::Rays::load(lanes.0[1].as_ptr());
+                    let place =
+                        place.mul_sub(place.filled(box_scale), place.filled(box_centre[axis]));
+                    group.places[vector][axis] = place;
+                    place.store(places.0[vector][axis].as_mut_ptr());
+                }
+                let place = |lane: usize| Vec3::from(places.0[vector].map(|axis| axis[lane]));
+                group.bounds[vector] = Aabb::around((0..K::Rays::N).map(place));
+            }
+            for lane in 0..K::Rays::N {
+                for axis in 0..3 {
+                    let mut lanes = Aligned([0.0; LANES]);
+                    for (vector, place) in lanes.0.iter_mut().enumerate() {
+                        *place = places.0[vector.min(count - 1)][axis][lane];
+                    }
+                    group.columns[lane][axis] = K::Rays::load(lanes.0.as_ptr());
                 }
             }
+            group.whole = Aabb::union_of(&group.bounds[..count]);
             group
         }
     }
 }
 
 /// Returns the greatest power of two up to a positive normal number.
-fn power_below(x: f64) -> f64 {
+pub(super) fn power_below(x: f64) -> f64 {
     f64::from_bits(x.to_bits() >> 52 << 52)
 }
 
@@ -326,29 +422,43 @@ struct Beam<'a, K: Instructions, O: Obstacles> {
     side: f32,
     /// The ends of the range, each with what is certainly before and behind it, as depths.
     range: [[f32; 2]; 2],
-    boxed: Ray,
     /// The sheared points.
     points: [[K::Rays; 3]; VECTORS],
-    /// The reciprocals of the direction for entries and for exits.
-    factors: [[K::Rays; 2]; 3],
-    /// A bit for each ray that nothing has stopped.
-    live: [u32; VECTORS],
-    /// A bit for each ray that enters the box of the leaf being visited, of the vectors that do.
-    entered: [u32; VECTORS],
-    /// What was done, about in cycles.
-    work: u64,
-    /// Whether every ray is tested against the boxes of inner nodes, how many of those were, and
-    /// how many no ray enters.
-    is_strict: bool,
-    tested: u32,
-    pruned: u32,
+    /// What decides which boxes rays enter: for each ray, for each vector and for all.
+    sides: [Sides<K::Rays>; VECTORS],
+    bounds: [Bounds<K::Boxes>; VECTORS],
+    whole: Bounds<K::Boxes>,
+    outlook: Outlook<K::Boxes>,
 }
 
 impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
     #[inline(always)]
-    unsafe fn new(group: &'a Group<K>, beams: &'a Beams<'a, O>, direction: DVec3) -> Self {
-        let boxed =
-            beams.obstacles.boxed(&beams.obstacles.ray(beams.points[0], direction, beams.range));
+    unsafe fn new(group: &'a Group<K>, beams: &'a Beams<'a, O>) -> Self {
+        // SAFETY: the processor has the instructions.
+        unsafe {
+            let none = [K::Rays::splat(0.0); 3];
+            Self {
+                group,
+                beams,
+                direction: DVec3::ZERO,
+                axes: [0; 3],
+                slope: [0.0; 2],
+                half: [0.0; 3],
+                side: 0.0,
+                range: [[0.0; 2]; 2],
+                points: [none; VECTORS],
+                sides: [Sides { pairs: none, begin: none, end: none[0] }; VECTORS],
+                bounds: [Bounds::none(); VECTORS],
+                whole: Bounds::none(),
+                outlook: Outlook::none(),
+            }
+        }
+    }
+
+    /// Turns all rays to a direction.
+    #[inline(always)]
+    unsafe fn aim(&mut self, direction: DVec3) {
+        let Self { group, beams, .. } = *self;
         let axes = AXES[largest_axis(direction)];
         let [x, y, z] = axes;
         let depth = direction[z];
@@ -356,248 +466,138 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
         let slopes = slope.map(|slope| slope as f32);
         let size = depth.abs() * group.scale;
         let half = group.half;
+        self.direction = direction;
+        self.axes = axes;
+        self.slope = slope;
+        self.half = [
+            slopes[0].abs().mul_add(half[z], half[x]) * (1.0 + 2.0 * f32::EPSILON),
+            slopes[1].abs().mul_add(half[z], half[y]) * (1.0 + 2.0 * f32::EPSILON),
+            half[z],
+        ];
+        self.side = if depth < 0.0 { -0.0 } else { 0.0 };
+        self.range = beams.range.map(|t| {
+            let end = (t * size).min(16.0);
+            let slack = end * f64::from(pow2(-21)) + f64::from(f32::from_bits(1)) * size;
+            [(end - slack) as f32, (end + slack) as f32]
+        });
         // SAFETY: the processor has the instructions.
         unsafe {
-            let none = K::Rays::splat(0.0);
-            let inverse = boxed.inverse_direction();
-            let mut beam = Self {
-                group,
-                beams,
-                direction,
-                axes,
-                slope,
-                half: [
-                    slopes[0].abs().mul_add(half[z], half[x]) * (1.0 + 2.0 * f32::EPSILON),
-                    slopes[1].abs().mul_add(half[z], half[y]) * (1.0 + 2.0 * f32::EPSILON),
-                    half[z],
-                ],
-                side: if depth < 0.0 { -0.0 } else { 0.0 },
-                range: beams.range.map(|t| {
-                    let end = (t * size).min(16.0);
-                    let slack = end * f64::from(pow2(-21)) + f64::from(f32::from_bits(1)) * size;
-                    [(end - slack) as f32, (end + slack) as f32]
-                }),
-                boxed,
-                points: [[none; 3]; VECTORS],
-                factors: [[none; 2]; 3],
-                live: [0; VECTORS],
-                entered: [0; VECTORS],
-                work: 0,
-                is_strict: true,
-                tested: 0,
-                pruned: 0,
-            };
-            for (axis, factors) in beam.factors.iter_mut().enumerate() {
-                let near = K::Rays::splat(inverse[axis] * NEAR);
-                *factors = [near, K::Rays::splat(inverse[axis] * FAR)];
-            }
             let slopes = [K::Rays::splat(slopes[0]), K::Rays::splat(slopes[1])];
             for vector in 0..group.count {
                 let relative = &group.relative[vector];
                 let depths = relative[z];
-                beam.points[vector] = [
+                self.points[vector] = [
                     depths.mul_add(slopes[0], relative[x]),
                     depths.mul_add(slopes[1], relative[y]),
                     depths,
                 ];
-                let first = vector * K::Rays::N;
-                let lanes = K::Rays::N.min(beams.points.len() - first);
-                let above = |lane: &usize| beams.is_above(first + lane, direction);
-                beam.live[vector] = match beams.normals {
-                    None => u32::MAX >> (32 - lanes),
-                    Some(_) => (0..lanes).filter(above).map(|lane| 1 << lane).sum(),
-                };
             }
-            beam
+            self.look();
         }
     }
 
-    /// Returns a bit for each point whose ray nothing has stopped.
+    /// Computes what decides which boxes rays enter.
     #[inline(always)]
-    fn free(&self) -> u64 {
-        let bits = |vector: usize| u64::from(self.live[vector]) << (vector * K::Rays::N);
-        (0..self.group.count).map(bits).sum()
-    }
-
-    /// Visits what the rays enter below a child.
-    ///
-    /// # Safety
-    /// From `base` on there is room for a stack.
-    #[inline(always)]
-    unsafe fn traverse(&mut self, root: Child, base: *mut Pending) {
-        let wide = self.beams.obstacles.boxes();
-        // SAFETY: the processor has the instructions; references are sound, and the stack has room.
+    unsafe fn look(&mut self) {
+        let Self { group, beams, direction, .. } = *self;
+        let ray = beams.obstacles.ray(beams.points[0], direction, beams.range);
+        let boxed = beams.obstacles.boxed(&ray);
+        let along = boxed.direction();
+        let sign = Vec3::ONE.copysign(along);
+        let size = along.abs() / along.abs().max_element();
+        let last = largest_axis(size.as_dvec3());
+        let range = f64::from(boxed.t_max()) * (1.0 + f64::from(pow2(-20)));
+        let range = (range + f64::from(f32::from_bits(1))) * f64::from(along[last].abs());
+        let pad = pow2(-19);
+        let range = (range * f64::from(group.box_scale) * f64::from(1.0 + pad)) as f32 + pad;
+        // SAFETY: the processor has the instructions; there are aligned lanes.
         unsafe {
-            let intervals = Intervals::<K>::new(&self.boxed, &self.group.bounds, self.group.count);
-            let mut top = base;
-            let mut child = root;
-            let mut vectors = u32::MAX >> (32 - self.group.count);
-            if !child.is_node() {
-                self.entered = self.live;
-                self.visit_leaf(child.index(), vectors);
-                return;
+            self.outlook = Outlook::new(sign, size, group.box_scale, group.box_centre, last);
+            let mut factors = [[K::Rays::splat(0.0); 2]; 3];
+            for (factors, [a, b]) in factors.iter_mut().zip(PAIRS) {
+                *factors = [K::Rays::splat(sign[a] * size[b]), K::Rays::splat(sign[b] * size[a])];
             }
-            loop {
-                let node = &*wide.nodes.as_ptr().add(child.index());
-                let (entering, mut inner) = self.enter_children(node, vectors, &intervals);
-                let is_leaf = K::Boxes::load(node.children.as_ptr().cast()).signs();
-                let mut leaves = inner & is_leaf;
-                inner &= !is_leaf;
-                while leaves != 0 {
-                    let lane = leaves.trailing_zeros() as usize & 7;
-                    leaves &= leaves - 1;
-                    let entered = self.enter(node, lane, &intervals, entering.of(lane));
-                    let leaf = node.children.get_unchecked(lane).index();
-                    if entered != 0 && self.visit_leaf(leaf, entered) {
-                        return;
-                    }
-                }
-                while inner != 0 {
-                    let lane = inner.trailing_zeros() as usize & 7;
-                    inner &= inner - 1;
-                    let mut entered = entering.of(lane);
-                    if self.is_strict {
-                        entered = self.enter(node, lane, &intervals, entered);
-                        self.tested += 1;
-                        self.pruned += u32::from(entered == 0);
-                    }
-                    if entered != 0 {
-                        let child = node.children.get_unchecked(lane).bits();
-                        *top = u64::from(child) | u64::from(entered) << 32;
-                        top = top.add(1);
-                    }
-                }
-                if top == base {
-                    return;
-                }
-                top = top.sub(1);
-                child = Child::from_bits(*top as u32);
-                vectors = (*top >> 32) as u32;
-            }
-        }
-    }
-
-    /// Returns which of some vectors have live rays that may enter the children of a node, and a bit
-    /// for each child that any may enter.
-    #[inline(always)]
-    unsafe fn enter_children(
-        &mut self,
-        node: &WideNode,
-        mut vectors: u32,
-        intervals: &Intervals<K>,
-    ) -> (Entering, u32) {
-        let mut entering = Entering([0; 2]);
-        let mut any = 0;
-        self.work += 20 + 12 * u64::from(vectors.count_ones());
-        // SAFETY: the processor has the instructions.
-        unsafe {
-            while vectors != 0 {
-                let vector = vectors.trailing_zeros() as usize % VECTORS;
-                vectors &= vectors - 1;
-                if self.live[vector] != 0 {
-                    let mask = intervals.enter(node, vector);
-                    entering.0[vector / 8] |= u64::from(mask) << (8 * (vector % 8));
-                    any |= mask;
+            let mut least = pairs(&group.columns[0], &factors);
+            let mut most = least;
+            for places in &group.columns[1..K::Rays::N] {
+                for (k, pair) in pairs(places, &factors).into_iter().enumerate() {
+                    least[k] = least[k].min(pair);
+                    most[k] = most[k].max(pair);
                 }
             }
-        }
-        (entering, any)
-    }
-
-    /// Returns which of some vectors have live rays that enter the box of a node's child, and notes
-    /// these rays.
-    #[inline(always)]
-    unsafe fn enter(
-        &mut self,
-        node: &WideNode,
-        lane: usize,
-        intervals: &Intervals<K>,
-        mut vectors: u32,
-    ) -> u32 {
-        let mut entered = 0;
-        self.work += 20 * u64::from(vectors.count_ones());
-        // SAFETY: the processor has the instructions; there are six planes of eight lanes.
-        unsafe {
-            let lanes = node.planes.as_ptr().cast::<f32>().add(lane);
-            while vectors != 0 {
-                let vector = vectors.trailing_zeros() as usize % VECTORS;
-                vectors &= vectors - 1;
-                let mut entry = K::Rays::splat(self.boxed.t_min());
-                let mut exit = K::Rays::splat(self.boxed.t_max());
+            let mut extremes = Aligned([[[0.0; LANES]; 2]; 3]);
+            for (k, extremes) in extremes.0.iter_mut().enumerate() {
+                least[k].store(extremes[0].as_mut_ptr());
+                most[k].store(extremes[1].as_mut_ptr());
+                self.whole.least[k] = K::Boxes::splat(least_of(least[k]));
+                self.whole.most[k] = K::Boxes::splat(most[k].greatest());
+            }
+            let minus = sign.map(|sign| 0.0f32.copysign(sign));
+            for (vector, bounds) in self.bounds.iter_mut().enumerate().take(group.count) {
+                let places = &group.places[vector];
+                let sides = &mut self.sides[vector];
+                sides.pairs = pairs(places, &factors);
                 for axis in 0..3 {
-                    let origin = self.group.origins[vector][axis];
-                    let [near_factor, far_factor] = self.factors[axis];
-                    let near = K::Rays::splat(*lanes.add(WideNode::LANES * intervals.near[axis]));
-                    let far = K::Rays::splat(*lanes.add(WideNode::LANES * intervals.far[axis]));
-                    entry = entry.max((near - origin) * near_factor);
-                    // `min` returns the second of a NaN and a number.
-                    exit = ((far - origin) * far_factor).min(exit);
+                    sides.begin[axis] = places[axis] ^ places[axis].filled(minus[axis]);
+                    bounds.least[axis] = K::Boxes::splat(extremes.0[axis][0][vector]);
+                    bounds.most[axis] = K::Boxes::splat(extremes.0[axis][1][vector]);
                 }
-                let rays = entry.le(exit).bits() & self.live[vector];
-                self.entered[vector] = rays;
-                entered |= u32::from(rays != 0) << vector;
+                sides.end = sides.begin[last] + places[last].filled(range);
+                bounds.set_ends(&group.bounds[vector], sign, last, range);
             }
-        }
-        entered
-    }
-
-    /// Tests the triangles of a leaf with the rays of some vectors that enter it. Returns whether all
-    /// rays are stopped.
-    #[inline(always)]
-    unsafe fn visit_leaf(&mut self, mut index: usize, vectors: u32) -> bool {
-        let wide = self.beams.obstacles.boxes();
-        // SAFETY: a block that is not its leaf's last is followed by another.
-        unsafe {
-            loop {
-                let block = &*wide.blocks.as_ptr().add(index);
-                if self.visit(block, vectors) {
-                    return true;
-                }
-                if block.is_last() {
-                    return false;
-                }
-                index += 1;
-            }
+            self.whole.set_ends(&group.whole, sign, last, range);
         }
     }
+}
 
-    /// Tests the triangles of a block. Returns whether all rays are stopped.
+impl<K: Instructions, O: Obstacles> Shape<K, O> for Beam<'_, K, O> {
+    type Outline = Outline<K::Boxes>;
+    type Rows = Rows;
+    type Child = Outline<K::Rays>;
+    type Shadows = Shadows;
+
     #[inline(always)]
-    unsafe fn visit(&mut self, block: &TriangleBlock, vectors: u32) -> bool {
+    unsafe fn outline(&self, node: &WideNode) -> Outline<K::Boxes> {
         // SAFETY: the processor has the instructions.
-        unsafe {
-            let shadows = Shadows::new(self, block);
-            self.work += 100;
-            for lane in 0..block.len() {
-                let mut left = vectors;
-                while left != 0 {
-                    let vector = left.trailing_zeros() as usize % VECTORS;
-                    left &= left - 1;
-                    let live = self.live[vector] & self.entered[vector];
-                    if live == 0 {
-                        continue;
-                    }
-                    self.work += 20;
-                    let (mut stopped, mut open) = self.test(&shadows, lane, vector, live);
-                    while open != 0 {
-                        let point = vector * K::Rays::N + open.trailing_zeros() as usize;
-                        let Beams { obstacles, points, range, .. } = self.beams;
-                        let ray = obstacles.ray(points[point], self.direction, *range);
-                        let is_stopped = obstacles.stops(&ray, block, lane);
-                        stopped |= u32::from(is_stopped) << open.trailing_zeros();
-                        open &= open - 1;
-                    }
-                    self.live[vector] &= !stopped;
-                }
-            }
-        }
-        self.live[..self.group.count].iter().all(|&live| live == 0)
+        unsafe { self.outlook.outline(node) }
     }
 
-    /// Returns a bit for each of some rays of a vector that the triangle in a lane certainly stops,
-    /// and for each that it may stop.
     #[inline(always)]
-    unsafe fn test(&self, shadows: &Shadows, lane: usize, vector: usize, live: u32) -> (u32, u32) {
+    unsafe fn all(&self, outline: &Outline<K::Boxes>) -> (u32, Option<K::Boxes>) {
+        (outline.meets_bounds(&self.whole), None)
+    }
+
+    #[inline(always)]
+    unsafe fn vector(&self, outline: &Outline<K::Boxes>, vector: usize) -> u32 {
+        outline.meets_bounds(&self.bounds[vector])
+    }
+
+    #[inline(always)]
+    unsafe fn write(&self, outline: &Outline<K::Boxes>, rows: *mut Rows) {
+        // SAFETY: there is room.
+        unsafe { outline.write(rows) };
+    }
+
+    #[inline(always)]
+    unsafe fn child(&self, rows: &Rows, lane: usize) -> Outline<K::Rays> {
+        // SAFETY: the processor has the instructions, and there is such a lane.
+        unsafe { Outline::of_child(rows, lane) }
+    }
+
+    #[inline(always)]
+    unsafe fn rays(&self, child: &Outline<K::Rays>, vector: usize) -> u32 {
+        let Sides { pairs, begin, end } = &self.sides[vector];
+        child.meets(pairs, pairs, begin, *end)
+    }
+
+    #[inline(always)]
+    unsafe fn shadows(&self, block: &TriangleBlock) -> Shadows {
+        // SAFETY: the processor has the instructions.
+        unsafe { Shadows::new(self, block) }
+    }
+
+    #[inline(always)]
+    unsafe fn test(&self, shadows: &Shadows, lane: usize, vector: usize, rays: u32) -> (u32, u32) {
         // SAFETY: the processor has the instructions; the lane is one of four.
         unsafe {
             let [x, y, z] = self.points[vector];
@@ -614,7 +614,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
             if is_flat {
                 missed &= error.lt(u.max(v).max(w)).bits();
             }
-            let possible = live & !missed;
+            let possible = rays & !missed;
             if possible == 0 {
                 return (0, 0);
             }
@@ -631,28 +631,17 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
             (stopped, possible & !stopped & !beyond.bits())
         }
     }
-}
 
-/// A byte for each vector with a bit for each child of a node that its rays may enter.
-struct Entering([u64; 2]);
-
-impl Entering {
-    /// Returns a bit for each vector whose rays may enter a child.
-    #[inline(always)]
-    fn of(&self, child: usize) -> u32 {
-        // Moves the lowest bit of byte i to bit 56 + i.
-        let gather = |bytes: u64| {
-            let lowest = (bytes >> child) & 0x0101_0101_0101_0101;
-            (lowest.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
-        };
-        gather(self.0[0]) | gather(self.0[1]) << 8
+    fn ray(&self, number: usize) -> O::Ray {
+        let Beams { obstacles, points, range, .. } = self.beams;
+        obstacles.ray(points[number], self.direction, *range)
     }
 }
 
 /// The coefficients of four triangles for a beam, lane by lane: three for each edge value, three for
 /// the depth, |S|, and the bounds of the errors. The signs are those for a positive S and a positive
 /// direction.
-struct Shadows([[f32; 4]; 15]);
+pub(super) struct Shadows([[f32; 4]; 15]);
 
 impl Shadows {
     const DEPTH: usize = 9;
@@ -778,68 +767,196 @@ unsafe fn write<L: Lanes>(
     x.abs().mul_add(hx, y.abs().mul_add(hy, constant.abs()))
 }
 
-/// The vectors of a beam, as the children of nodes are tested with them.
-struct Intervals<K: Instructions> {
+/// The pairs of axes.
+const PAIRS: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
+
+/// Returns the places of rays beside each other, for each pair of axes.
+#[inline(always)]
+fn pairs<L: Lanes>(&[x, y, z]: &[L; 3], [xy, yz, zx]: &[[L; 2]; 3]) -> [L; 3] {
+    [x.mul_sub(xy[0], y * xy[1]), y.mul_sub(yz[0], z * yz[1]), z.mul_sub(zx[0], x * zx[1])]
+}
+
+/// What decides which boxes rays enter, a ray per lane: where they run beside each other, and where
+/// they begin and end.
+#[derive(Clone, Copy)]
+struct Sides<L> {
+    pairs: [L; 3],
+    begin: [L; 3],
+    end: L,
+}
+
+/// Bounds of the sides of many rays.
+#[derive(Clone, Copy)]
+struct Bounds<L> {
+    least: [L; 3],
+    most: [L; 3],
+    begin: [L; 3],
+    end: L,
+}
+
+impl<L: Lanes> Bounds<L> {
+    #[inline(always)]
+    unsafe fn none() -> Self {
+        // SAFETY: the processor has the instructions.
+        let none = unsafe { L::splat(0.0) };
+        Self { least: [none; 3], most: [none; 3], begin: [none; 3], end: none }
+    }
+
+    #[inline(always)]
+    unsafe fn set_ends(&mut self, places: &Aabb, sign: Vec3, last: usize, range: f32) {
+        // SAFETY: the processor has the instructions.
+        unsafe {
+            for axis in 0..3 {
+                let is_forwards = sign[axis] > 0.0;
+                let begin = if is_forwards { places.min[axis] } else { -places.max[axis] };
+                self.begin[axis] = L::splat(begin);
+            }
+            let end = if sign[last] > 0.0 { places.max[last] } else { -places.min[last] };
+            self.end = L::splat(end + range);
+        }
+    }
+}
+
+/// A direction as boxes are seen along it.
+struct Outlook<L> {
     /// The rows of the planes that the rays meet first, by axis, and of the planes opposite.
     near: [usize; 3],
     far: [usize; 3],
-    /// The origins of near and of far planes for the least distance to one and the greatest to the
-    /// other.
-    origins: [[[K::Boxes; 2]; 3]; VECTORS],
-    factors: [[K::Boxes; 2]; 3],
-    begin: K::Boxes,
-    end: K::Boxes,
+    scale: [L; 3],
+    centre: [L; 3],
+    size: [L; 3],
+    pad: L,
+    /// The axis along which the direction is largest.
+    last: usize,
 }
 
-impl<K: Instructions> Intervals<K> {
+impl<L: Lanes> Outlook<L> {
     #[inline(always)]
-    unsafe fn new(ray: &Ray, bounds: &[Aabb; VECTORS], count: usize) -> Self {
-        let inverse = ray.inverse_direction();
+    unsafe fn none() -> Self {
+        // SAFETY: the processor has the instructions.
+        unsafe { Self::new(Vec3::ONE, Vec3::ONE, 1.0, Vec3::ONE, 0) }
+    }
+
+    #[inline(always)]
+    unsafe fn new(sign: Vec3, size: Vec3, scale: f32, centre: Vec3, last: usize) -> Self {
         // SAFETY: the processor has the instructions.
         unsafe {
-            let none = K::Boxes::splat(0.0);
-            let mut intervals = Self {
-                near: [0; 3],
-                far: [0; 3],
-                origins: [[[none; 2]; 3]; VECTORS],
-                factors: [[none; 2]; 3],
-                begin: K::Boxes::splat(ray.t_min()),
-                end: K::Boxes::splat(ray.t_max()),
-            };
-            for axis in 0..3 {
-                let is_backwards = inverse[axis].is_sign_negative();
-                intervals.near[axis] = axis + 3 * usize::from(is_backwards);
-                intervals.far[axis] = axis + 3 * usize::from(!is_backwards);
-                for (bounds, origins) in bounds.iter().zip(&mut intervals.origins).take(count) {
-                    let (low, high) = (bounds.min[axis], bounds.max[axis]);
-                    let (near, far) = if is_backwards { (low, high) } else { (high, low) };
-                    origins[axis] = [K::Boxes::splat(near), K::Boxes::splat(far)];
-                }
-                let near = K::Boxes::splat(inverse[axis] * NEAR);
-                intervals.factors[axis] = [near, K::Boxes::splat(inverse[axis] * FAR)];
+            let splat = |v: Vec3| [L::splat(v.x), L::splat(v.y), L::splat(v.z)];
+            let is_backwards = [sign.x < 0.0, sign.y < 0.0, sign.z < 0.0].map(usize::from);
+            let [x, y, z] = is_backwards;
+            Self {
+                near: [3 * x, 1 + 3 * y, 2 + 3 * z],
+                far: [3 - 3 * x, 4 - 3 * y, 5 - 3 * z],
+                scale: splat(sign * scale),
+                centre: splat(sign * centre),
+                size: splat(size),
+                pad: L::splat(pow2(-19)),
+                last,
             }
-            intervals
         }
     }
 
-    /// Returns a bit for each child of a node that some ray of a vector may enter.
+    /// Returns what bounds the rays that enter the children of a node.
     #[inline(always)]
-    unsafe fn enter(&self, node: &WideNode, vector: usize) -> u32 {
-        let mut entry = self.begin;
-        let mut exit = self.end;
-        // SAFETY: planes are whole and aligned; there is such a vector.
+    unsafe fn outline(&self, node: &WideNode) -> Outline<L> {
+        // SAFETY: planes are whole and aligned.
         unsafe {
             let planes = node.planes.as_ptr();
-            let origins = self.origins.get_unchecked(vector);
-            for (axis, &[near_origin, far_origin]) in origins.iter().enumerate() {
-                let [near_factor, far_factor] = self.factors[axis];
-                let near = K::Boxes::load(planes.add(self.near[axis]).cast());
-                let far = K::Boxes::load(planes.add(self.far[axis]).cast());
-                entry = entry.max((near - near_origin) * near_factor);
-                // `min` returns the second of a NaN and a number.
-                exit = ((far - far_origin) * far_factor).min(exit);
+            let near = self.planes(planes, &self.near);
+            let far = self.planes(planes, &self.far);
+            let pad = self.pad;
+            let [x, y, z] = self.size;
+            Outline {
+                least: [
+                    near[0].mul_sub(y, far[1].mul_add(x, pad)),
+                    near[1].mul_sub(z, far[2].mul_add(y, pad)),
+                    near[2].mul_sub(x, far[0].mul_add(z, pad)),
+                ],
+                most: [
+                    far[0].mul_sub(y, near[1].mul_sub(x, pad)),
+                    far[1].mul_sub(z, near[2].mul_sub(y, pad)),
+                    far[2].mul_sub(x, near[0].mul_sub(z, pad)),
+                ],
+                far,
+                near: near[self.last],
             }
         }
-        entry.le(exit).bits()
+    }
+
+    #[inline(always)]
+    unsafe fn planes(&self, planes: *const [f32; 8], rows: &[usize; 3]) -> [L; 3] {
+        // SAFETY: planes are whole and aligned.
+        unsafe {
+            let [x, y, z] = [
+                L::load(planes.add(rows[0]).cast()),
+                L::load(planes.add(rows[1]).cast()),
+                L::load(planes.add(rows[2]).cast()),
+            ];
+            [
+                x.mul_sub(self.scale[0], self.centre[0]),
+                y.mul_sub(self.scale[1], self.centre[1]),
+                z.mul_sub(self.scale[2], self.centre[2]),
+            ]
+        }
+    }
+}
+
+/// Bounds of the sides of rays that enter boxes.
+pub(super) struct Outline<L> {
+    least: [L; 3],
+    most: [L; 3],
+    far: [L; 3],
+    near: L,
+}
+
+/// An outline of eight boxes.
+pub(super) type Rows = Aligned<[[f32; WideNode::LANES]; 10]>;
+
+impl<L: Lanes> Outline<L> {
+    /// Returns a bit for each box that rays of these bounds may enter.
+    #[inline(always)]
+    fn meets_bounds(&self, Bounds { least, most, begin, end }: &Bounds<L>) -> u32 {
+        self.meets(least, most, begin, *end)
+    }
+
+    #[inline(always)]
+    fn meets(&self, least: &[L; 3], most: &[L; 3], begin: &[L; 3], end: L) -> u32 {
+        let mut meets = self.near.le(end);
+        for axis in 0..3 {
+            meets = meets
+                & self.least[axis].le(most[axis])
+                & least[axis].le(self.most[axis])
+                & begin[axis].le(self.far[axis]);
+        }
+        meets.bits()
+    }
+
+    #[inline(always)]
+    unsafe fn write(&self, rows: *mut Rows) {
+        // SAFETY: there is room for ten rows.
+        unsafe {
+            let to = rows.cast::<f32>();
+            for axis in 0..3 {
+                self.least[axis].store(to.add(8 * axis));
+                self.most[axis].store(to.add(8 * (3 + axis)));
+                self.far[axis].store(to.add(8 * (6 + axis)));
+            }
+            self.near.store(to.add(8 * 9));
+        }
+    }
+
+    /// Returns the outline of one child in all lanes.
+    #[inline(always)]
+    unsafe fn of_child(rows: &Rows, lane: usize) -> Self {
+        // SAFETY: the processor has the instructions; the rows have eight lanes.
+        unsafe {
+            let row = |row: usize| L::splat(*rows.0[row].get_unchecked(lane));
+            Self {
+                least: [row(0), row(1), row(2)],
+                most: [row(3), row(4), row(5)],
+                far: [row(6), row(7), row(8)],
+                near: row(9),
+            }
+        }
     }
 }

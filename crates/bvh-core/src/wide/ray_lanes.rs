@@ -304,7 +304,8 @@ impl<L: Lanes> RayBounds<L> {
     }
 }
 
+/// Returns the least number. None may be NaN.
 #[inline(always)]
-fn least<L: Lanes>(lanes: L) -> f32 {
+pub(super) fn least<L: Lanes>(lanes: L) -> f32 {
     -(lanes ^ lanes.filled(-0.0)).greatest()
 }
