@@ -124,9 +124,9 @@ mod tests {
             .unwrap();
         let mut tracers = Vec::new();
         for (library, settings) in all() {
-            let contenders = library.contenders(&settings, triangles).unwrap();
-            let named = |contender: Contender<'static>| (library.name(), contender.tracer);
-            tracers.extend(contenders.into_iter().map(named));
+            for contender in library.contenders(&settings, triangles).unwrap() {
+                tracers.push((library.name(), contender.tracer));
+            }
         }
         let mut shapes = bvh::shapes(triangles);
         let ours = bvh::to_theirs(&Target::BVH.fit(&tree), &mut shapes);

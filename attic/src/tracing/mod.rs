@@ -31,7 +31,7 @@ pub fn trace(
     keys: &Table,
     runs: &[FirstRun],
     cancelled: &dyn Fn() -> bool,
-) -> Result<Option<harness::peers::Traced>, Error> {
+) -> harness::peers::Traced {
     let config: Config =
         fault::deserialize(keys.clone()).map_err(|fault| Error::Usage(fault.to_string()))?;
     let (programs, mut text) = ray_programs(&config);

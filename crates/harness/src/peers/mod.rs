@@ -5,7 +5,6 @@
 //! no code here: see [`command`].
 
 pub mod command;
-mod program;
 
 use crate::Error;
 use bvh_config::OutOfRange;
@@ -65,11 +64,11 @@ pub struct Tracing {
     /// accepted.
     pub resolve: fn(Table) -> Result<Table, OutOfRange>,
     /// Traces rays through trees, scene by scene, until the last argument returns true.
-    pub trace: fn(&Table, &[FirstRun], &dyn Fn() -> bool) -> Result<Option<Traced>, Error>,
+    pub trace: fn(&Table, &[FirstRun], &dyn Fn() -> bool) -> Traced,
 }
 
-/// Files with their names, and lines for the terminal.
-pub type Traced = (Vec<NamedBytes>, String);
+/// Files with their names, and lines for the terminal; `None` if it was cancelled.
+pub type Traced = Result<Option<(Vec<NamedBytes>, String)>, Error>;
 
 /// The first run of a method on a scene.
 pub struct FirstRun<'a> {

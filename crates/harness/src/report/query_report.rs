@@ -133,8 +133,9 @@ impl Config {
                 let paper = of_paper.value / of_paper.over;
                 let mut found = Vec::new();
                 for row in table {
+                    let is_own = conditions.are_met(row)?;
                     let number = |end: &str| number_in(row, &format!("{}{end}", column.name));
-                    let ours = number("").filter(|_| conditions.are_met(row) == Ok(true));
+                    let ours = number("").filter(|_| is_own);
                     found.extend(ours.map(|ours| (row, ours, number("_low").zip(number("_high")))));
                 }
                 if of_paper.readings {
@@ -346,6 +347,10 @@ mod tests {
             ),
             ("columns = [{ name = 'scene', value = 'max cost' }]", "\"scene\" is no name"),
             ("figure = { x = 'cost', y = 'scene' }", "figure: there is no column \"cost\""),
+            (
+                "columns = [{ name = 'c', value = 'max cost', paper = [{ row = 'k=1', value = 1.0 }] }]",
+                "no column \"k\"",
+            ),
         ] {
             let error = made(change).unwrap_err();
             assert!(error.contains(message), "{error}");
