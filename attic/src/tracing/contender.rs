@@ -45,7 +45,9 @@ impl Tracer<'_> {
             (Self::Own(accelerator), _) => {
                 Ok(timed(rays, hits, |ray| accelerator.nearest_hit(ray)))
             }
-            (Self::Batches(wide), _) => Ok(in_batches(wide, batch, hits)),
+            (Self::Batches(wide), _) => {
+                Ok(in_batches(batch, hits, |batch, hits| time_batch(wide, batch, hits)))
+            }
         }
     }
 }
@@ -96,18 +98,18 @@ pub fn timed<R>(
 /// The number of rays per call of the wide layout. Their answers fit into the first-level cache.
 pub const BATCH: usize = 1024;
 
-/// Answers every ray in batches and returns the seconds of each part.
-fn in_batches(wide: &WideBvh, batch: &Batch, hits: &mut [Option<Hit>]) -> Vec<f64> {
-    let parts = batch.rays.chunks(PART);
-    parts
-        .zip(hits.chunks_mut(PART))
-        .map(|(rays, hits)| {
-            rays.chunks(BATCH)
-                .zip(hits.chunks_mut(BATCH))
-                .map(|(rays, hits)| time_batch(wide, &Batch { rays, ..*batch }, hits))
-                .sum()
-        })
-        .collect()
+/// Answers every ray by calls of up to [`BATCH`] rays, each of which returns its seconds. Returns
+/// the seconds of each part.
+pub fn in_batches(
+    batch: &Batch,
+    hits: &mut [Option<Hit>],
+    call: impl Fn(&Batch, &mut [Option<Hit>]) -> f64,
+) -> Vec<f64> {
+    let of_part = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
+        let calls = rays.chunks(BATCH).zip(hits.chunks_mut(BATCH));
+        calls.map(|(rays, hits)| call(&Batch { rays, ..*batch }, hits)).sum()
+    };
+    batch.rays.chunks(PART).zip(hits.chunks_mut(PART)).map(of_part).collect()
 }
 
 /// Answers the rays of one call and returns its seconds.

@@ -1,11 +1,11 @@
 //! The layouts of our trees for tracing, and the instruction sets that they are limited to.
 
 use super::answers::SOME_HIT;
-use super::contender::{BATCH, Batch, Contender, PART, Tracer};
+use super::contender::{BATCH, Batch, Contender, Tracer, in_batches};
 use bvh_core::cost::SahConstants;
 use bvh_core::{
-    Bvh, Corners, DRay, DTriangle, DWideBvh, Hit, InvalidBvh, Kernel, Select, Triangle, WideBvh,
-    collapse_leaves,
+    Bvh, Corners, DRay, DTriangle, DWideBvh, Hit, InvalidBvh, Kernel, Ray, Select, Triangle,
+    WideBvh, collapse_leaves,
 };
 use bvh_scenes::Scene;
 use bvh_scenes::trace::{Accelerator, Query, Structure};
@@ -170,7 +170,10 @@ fn own_contender<'a>(
             let wide =
                 wide.with_kernel(kernel).ok_or_else(|| format!("{kernel:?} is not available"))?;
             let is_single = layout == Layout::WideDouble;
-            Tracer::Other(Box::new(move |batch, hits| Ok(in_double(&wide, is_single, batch, hits))))
+            let call = move |batch: &Batch, hits: &mut [Option<Hit>]| {
+                in_double(&wide, is_single, batch, hits)
+            };
+            Tracer::Other(Box::new(move |batch, hits| Ok(in_batches(batch, hits, &call))))
         }
         None => {
             let tree = match layout {
@@ -216,55 +219,45 @@ fn double(tree: &Bvh, triangles: &[Triangle]) -> Result<DWideBvh, InvalidBvh> {
     DWideBvh::new(&tree, &triangles)
 }
 
-/// Answers every ray in f64, singly or in batches, and returns the seconds of
-/// each part. Rays are converted before the clock starts, as those of other libraries are.
+/// Answers the rays of one call in f64, singly or together, and returns its seconds. Rays are
+/// converted before the clock starts, as those of other libraries are.
 fn in_double(
     wide: &DWideBvh,
     is_single: bool,
-    batch: &Batch,
+    &Batch { query, coherence, rays, .. }: &Batch,
     hits: &mut [Option<Hit>],
-) -> Vec<f64> {
+) -> f64 {
     let all = Select::default();
-    let is_any = batch.query == Query::Any;
-    let mut nearest = [None; BATCH];
-    let mut any = [false; BATCH];
-    let mut seconds = Vec::new();
-    for (rays, hits) in batch.rays.chunks(PART).zip(hits.chunks_mut(PART)) {
-        let mut of_part = 0.0;
-        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            let rays: Vec<DRay> = rays
-                .iter()
-                .map(|ray| {
-                    let [origin, direction] = [ray.origin(), ray.direction()].map(|p| p.as_dvec3());
-                    DRay::new(origin, direction, ray.t_min().into(), ray.t_max().into())
-                        .expect("numbers of f32 that are rays there")
-                })
-                .collect();
-            let (nearest, any) = (&mut nearest[..rays.len()], &mut any[..rays.len()]);
-            let start = Instant::now();
-            match (is_single, is_any) {
-                (true, true) => {
-                    for (any, ray) in any.iter_mut().zip(&rays) {
-                        *any = wide.any_hit(ray, all);
-                    }
-                }
-                (true, false) => {
-                    for (nearest, ray) in nearest.iter_mut().zip(&rays) {
-                        *nearest = wide.nearest_hit(ray, all);
-                    }
-                }
-                (_, true) => wide.any_hits(&rays, all, any, batch.coherence),
-                (_, false) => wide.nearest_hits(&rays, all, nearest, batch.coherence),
-            }
-            of_part += start.elapsed().as_secs_f64();
-            for ((hit, nearest), any) in hits.iter_mut().zip(nearest).zip(any) {
-                *hit = match is_any {
-                    true => any.then_some(SOME_HIT),
-                    false => nearest.map(|hit| Hit { t: hit.t as f32, object: hit.object }),
-                };
+    let is_any = query == Query::Any;
+    let ray = |ray: &Ray| {
+        let [origin, direction] = [ray.origin(), ray.direction()].map(|p| p.as_dvec3());
+        DRay::new(origin, direction, ray.t_min().into(), ray.t_max().into())
+            .expect("numbers of f32 that are rays there")
+    };
+    let rays: Vec<DRay> = rays.iter().map(ray).collect();
+    let (mut nearest, mut any) = ([None; BATCH], [false; BATCH]);
+    let (nearest, any) = (&mut nearest[..rays.len()], &mut any[..rays.len()]);
+    let start = Instant::now();
+    match (is_single, is_any) {
+        (true, true) => {
+            for (any, ray) in any.iter_mut().zip(&rays) {
+                *any = wide.any_hit(ray, all);
             }
         }
-        seconds.push(of_part);
+        (true, false) => {
+            for (nearest, ray) in nearest.iter_mut().zip(&rays) {
+                *nearest = wide.nearest_hit(ray, all);
+            }
+        }
+        (_, true) => wide.any_hits(&rays, all, any, coherence),
+        (_, false) => wide.nearest_hits(&rays, all, nearest, coherence),
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    for ((hit, nearest), any) in hits.iter_mut().zip(nearest).zip(any) {
+        *hit = match is_any {
+            true => any.then_some(SOME_HIT),
+            false => nearest.map(|hit| Hit { t: hit.t as f32, object: hit.object }),
+        };
     }
     seconds
 }

@@ -12,7 +12,7 @@ use crate::{RACERS, programs};
 use bvh_config::{OutOfRange, fault};
 use contender::Contender;
 use harness::Error;
-use harness::peers::{FirstRun, NamedBytes, Tracing};
+use harness::peers::{FirstRun, NamedBytes};
 use harness::rows::{Row, to_bytes};
 use layout::own_contenders;
 use speed::{Config, Traced};
@@ -20,42 +20,38 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use toml::Table;
 
-/// Rays through the trees of first runs, timed in interleaved rounds.
-pub struct Rounds;
+/// Returns the table `tracing` of a spec with every default spelled out.
+pub fn resolve(keys: Table) -> Result<Table, OutOfRange> {
+    let config: Config = fault::deserialize(keys)?;
+    Table::try_from(config).map_err(|error| OutOfRange::new("tracing", error, "TOML"))
+}
 
-impl Tracing for Rounds {
-    fn resolve(&self, keys: Table) -> Result<Table, OutOfRange> {
-        let config: Config = fault::deserialize(keys)?;
-        Table::try_from(config).map_err(|error| OutOfRange::new("tracing", error, "TOML"))
+/// Traces rays through the trees of first runs, timed in interleaved rounds.
+pub fn trace(
+    keys: &Table,
+    runs: &[FirstRun],
+    cancelled: &dyn Fn() -> bool,
+) -> harness::peers::Traced {
+    let config: Config =
+        fault::deserialize(keys.clone()).map_err(|fault| Error::Usage(fault.to_string()))?;
+    let (programs, mut text) = ray_programs(&config);
+    let mut traced = Vec::new();
+    for runs in runs.chunk_by(|a, b| a.scene.name == b.scene.name) {
+        let of_scene = trace_scene(&config, runs, &programs, cancelled)
+            .map_err(|message| Error::Tracing { scene: runs[0].scene.name.clone(), message })?;
+        let Some(of_scene) = of_scene else { return Ok(None) };
+        traced.extend(of_scene);
     }
-
-    fn trace(
-        &self,
-        keys: &Table,
-        runs: &[FirstRun],
-        cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<(Vec<NamedBytes>, String)>, Error> {
-        let config: Config =
-            fault::deserialize(keys.clone()).map_err(|fault| Error::Usage(fault.to_string()))?;
-        let (programs, mut text) = ray_programs(&config);
-        let mut traced = Vec::new();
-        for runs in runs.chunk_by(|a, b| a.scene.name == b.scene.name) {
-            let of_scene = trace_scene(&config, runs, &programs, cancelled)
-                .map_err(|message| Error::Tracing { scene: runs[0].scene.name.clone(), message })?;
-            let Some(of_scene) = of_scene else { return Ok(None) };
-            traced.extend(of_scene);
-        }
-        let mut files = Vec::new();
-        if !config.ray_peers.is_empty() {
-            let raced: Vec<Raced> = traced.iter().map(|traced| raced(runs, traced)).collect();
-            let speeds = comparison::speeds(&raced);
-            let ratios = comparison::ratios(&speeds);
-            files.extend([file(&comparison::rows(&speeds))?, file(&ratios)?]);
-            text += &comparison::text(&ratios);
-        }
-        files.extend(rows(runs, traced)?);
-        Ok(Some((files, text)))
+    let mut files = Vec::new();
+    if !config.ray_peers.is_empty() {
+        let raced: Vec<Raced> = traced.iter().map(|traced| raced(runs, traced)).collect();
+        let speeds = comparison::speeds(&raced);
+        let ratios = comparison::ratios(&speeds);
+        files.extend([file(&comparison::rows(&speeds))?, file(&ratios)?]);
+        text += &comparison::text(&ratios);
     }
+    files.extend(rows(runs, traced)?);
+    Ok(Some((files, text)))
 }
 
 /// Returns the ray programs of other libraries that exist, and remarks on the missing ones.

@@ -1,7 +1,6 @@
 //! External programs as methods, in any language: they read the boxes of a scene from a file and
 //! write a tree file.
 
-use super::program::Program;
 use super::{BuildFault, Built, Library, Task};
 use bvh_config::fault;
 use bvh_config::{OutOfRange, above};
@@ -9,7 +8,7 @@ use bvh_core::{file, validate_references};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use toml::Table;
 
@@ -128,6 +127,40 @@ impl Config {
         let tree = file::load(&bytes, boxes).map_err(|error| invalid(&error))?;
         validate_references(&tree, boxes, objects).map_err(|error| invalid(&error))?;
         Ok(Built { tree, seconds })
+    }
+}
+
+/// A running program. Dropping it kills the program and all processes of its process group, even if
+/// the program itself has ended. A process that leaves the group escapes.
+#[derive(Debug)]
+struct Program(Child);
+
+impl Program {
+    /// Starts a program.
+    fn start(command: &mut Command) -> io::Result<Self> {
+        // A separate group can be killed as a whole, and Ctrl-C in the terminal does not reach it.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(command, 0);
+        command.spawn().map(Self)
+    }
+
+    /// Returns the exit status if the program has ended.
+    fn status(&mut self) -> io::Result<Option<ExitStatus>> {
+        self.0.try_wait()
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        // The system reuses the number of a group only after its last member has ended.
+        #[cfg(unix)]
+        {
+            use nix::{sys::signal, unistd::Pid};
+            let group = Pid::from_raw(self.0.id().cast_signed());
+            let _ = signal::killpg(group, signal::Signal::SIGKILL);
+        }
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 

@@ -5,7 +5,6 @@
 //! no code here: see [`command`].
 
 pub mod command;
-mod program;
 
 use crate::Error;
 use bvh_config::OutOfRange;
@@ -60,23 +59,16 @@ pub struct Built {
 }
 
 /// Rays that are traced through trees, timed: the table `tracing` of a spec.
-pub trait Tracing: Sync {
-    /// Returns the table with every default spelled out.
-    ///
-    /// # Errors
-    ///
-    /// An unknown key, or a value that is not accepted.
-    fn resolve(&self, keys: Table) -> Result<Table, OutOfRange>;
-
-    /// Traces rays through trees, scene by scene. Returns files with their names, and lines for the
-    /// terminal; `None` once `cancelled` returns true.
-    fn trace(
-        &self,
-        keys: &Table,
-        runs: &[FirstRun],
-        cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<(Vec<NamedBytes>, String)>, Error>;
+pub struct Tracing {
+    /// Returns the table with every default spelled out, or an unknown key or a value that is not
+    /// accepted.
+    pub resolve: fn(Table) -> Result<Table, OutOfRange>,
+    /// Traces rays through trees, scene by scene, until the last argument returns true.
+    pub trace: fn(&Table, &[FirstRun], &dyn Fn() -> bool) -> Traced,
 }
+
+/// Files with their names, and lines for the terminal; `None` if it was cancelled.
+pub type Traced = Result<Option<(Vec<NamedBytes>, String)>, Error>;
 
 /// The first run of a method on a scene.
 pub struct FirstRun<'a> {
@@ -104,7 +96,7 @@ pub struct Others {
     /// The libraries that specs may name.
     pub libraries: &'static [&'static dyn Library],
     /// The measurement of a spec's key `tracing`.
-    pub tracing: &'static dyn Tracing,
+    pub tracing: Tracing,
 }
 
 /// What this program contains, which does not change while it runs.

@@ -4,7 +4,7 @@ use super::config::check_file;
 use super::data::{Series, ratio};
 use super::drawing::{Drawing, Shape};
 use super::prelude::*;
-use crate::statistics::quartiles;
+use crate::statistics::{quantile, quartiles};
 
 report! {
     /// Error against run time.
@@ -13,6 +13,10 @@ report! {
         file: String = "anytime".into();
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
         methods: Vec<String>, in OneOrMore;
+        /// Distances above the best known cost in per cent, for a table of the seconds that the
+        /// methods need to get there. Default none.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        targets: Vec<f64> = vec![], in 0.0..=1e6;
     }
     check |config: &Self| check_file("timing_", &config.file);
 }
@@ -39,22 +43,48 @@ impl Point<'_> {
     }
 }
 
+/// One method and target on one scene, as written to `timing_FILE_targets.csv`.
+#[derive(Serialize)]
+pub(super) struct Reached<'a> {
+    scene: &'a str,
+    target: String,
+    method: &'a str,
+    /// All runs.
+    runs: usize,
+    /// Runs that reach the target.
+    solved: usize,
+    /// Median over all runs, counting runs that never reach the target as last; empty if it is
+    /// beside or at such a run.
+    median: Option<f64>,
+    /// The same for the quantile 0.9.
+    quantile_90: Option<f64>,
+}
+
 /// Points per factor of ten along a curve.
 const PER_DECADE: f64 = 20.0;
 
 impl Config {
-    /// Returns the name of the CSV file without its extension.
-    pub(super) fn csv(&self) -> String {
-        format!("timing_{}", self.file)
+    /// Returns the names of the CSV files without extensions: of the curves, and of the targets if
+    /// there are any.
+    pub(super) fn names(&self) -> Vec<String> {
+        let names = ["", "_targets"].map(|end| format!("timing_{}{end}", self.file));
+        names.into_iter().take(if self.targets.is_empty() { 1 } else { 2 }).collect()
     }
 
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut points = Vec::new();
+        let mut reached = Vec::new();
         for scene in rows.scenes() {
             // A scene without a reference has no gaps.
             let Some(reference) = rows.reference(scene) else { continue };
             for method in &self.methods {
-                points.extend(curve(scene, method, &rows.series(scene, method), reference.cost));
+                let runs = rows.series(scene, method);
+                points.extend(curve(scene, method, &runs, reference.cost));
+                reached.extend(self.targets.iter().map(|&percent| {
+                    let cost = reference.cost * (1.0 + percent / 100.0);
+                    let target = format!("best known +{percent} %");
+                    Reached::new(scene, target, method, &runs, cost)
+                }));
             }
         }
         let figure = Drawing {
@@ -74,10 +104,33 @@ impl Config {
         let caption = "Median and quartiles over repetitions. Points are builders. A curve falls \
                        to the floor where it is the best known.";
         let mut output = Output::default();
-        let file = self.csv();
-        output.add_csv(&file, &corners(&points))?;
-        output.add_figure(file, caption, 2, figure.panels(rows, &output.table()?));
+        let names = self.names();
+        output.add_csv(&names[0], &corners(&points))?;
+        output.add_figure(&names[0], caption, 2, figure.panels(rows, &output.table()?));
+        if let Some(targets) = names.get(1) {
+            output.add_csv(targets, &reached)?;
+        }
         Ok(output)
+    }
+}
+
+impl<'a> Reached<'a> {
+    fn new(scene: &'a str, target: String, method: &'a str, runs: &[Series], cost: f64) -> Self {
+        // Runs without success must count: dropping them would favour methods that rarely succeed.
+        let time = |run: &Series| {
+            run.iter().find(|(_, incumbent)| *incumbent <= cost).map_or(f64::INFINITY, |at| at.0)
+        };
+        let times: Vec<f64> = runs.iter().map(time).collect();
+        let quantile = |q| quantile(&times, q).filter(|time| time.is_finite());
+        Self {
+            scene,
+            target,
+            method,
+            runs: runs.len(),
+            solved: times.iter().filter(|time| time.is_finite()).count(),
+            median: quantile(0.5),
+            quantile_90: quantile(0.9),
+        }
     }
 }
 
@@ -131,6 +184,16 @@ fn corners<'a>(points: &[Point<'a>]) -> Vec<Point<'a>> {
 mod tests {
     use super::*;
     use crate::statistics::median;
+
+    #[test]
+    fn a_target_is_reached_by_the_first_incumbent_at_or_below_it_or_never() {
+        let runs = [vec![(1.0, 9.0), (2.0, 7.0), (5.0, 6.0)], vec![(3.0, 7.0)]];
+        let when = [9.5, 7.0, 6.0, 1.0].map(|cost| {
+            let reached = Reached::new("", String::new(), "", &runs, cost);
+            (reached.solved, reached.median)
+        });
+        assert_eq!(when, [(2, Some(2.0)), (2, Some(2.5)), (1, None), (0, None)]);
+    }
 
     #[test]
     fn the_median_of_incumbents_never_rises() {

@@ -3,10 +3,7 @@
 use super::query;
 use crate::Error;
 use crate::rows::csv_file::parse;
-use crate::rows::{
-    self, ClockRow, HistoryRow, RayRow, ReferenceRow, Row, RunRow, RunTestRow, TestRow, TimingRow,
-    TrialRow, VisitRow,
-};
+use crate::rows::{self, ClockRow, HistoryRow, ReferenceRow, Row, RunRow, TrialRow};
 use bvh_scenes::SceneKind;
 use indexmap::IndexMap;
 use std::hash::Hash;
@@ -26,15 +23,10 @@ pub struct Rows {
     pub runs: Vec<RunRow>,
     pub history: Vec<HistoryRow>,
     pub trials: Vec<TrialRow>,
-    pub timing: Vec<TimingRow>,
-    pub rays: Vec<RayRow>,
     /// One row for every row of `history`, in the same order, or none.
     pub clock: Vec<ClockRow>,
     /// Those by the experiment's objective.
     pub references: Vec<ReferenceRow>,
-    pub tests: Vec<TestRow>,
-    pub run_tests: Vec<RunTestRow>,
-    pub visits: Vec<VisitRow>,
 }
 
 impl Rows {
@@ -46,13 +38,8 @@ impl Rows {
             runs: rows::read(&folder.join(RunRow::FILE))?,
             history: rows::read_if_any(folder)?,
             trials: rows::read_if_any(folder)?,
-            timing: rows::read_if_any(folder)?,
-            rays: rows::read_if_any(folder)?,
             clock: rows::read_if_any(folder)?,
             references: rows::read_if_any(folder)?,
-            tests: rows::read_if_any(folder)?,
-            run_tests: rows::read_if_any(folder)?,
-            visits: rows::read_if_any(folder)?,
         })
     }
 
@@ -106,22 +93,6 @@ impl Rows {
         self.references.iter().find(|row| row.scene == scene)
     }
 
-    /// Returns the runs of one method on one scene.
-    pub fn runs_of(&self, scene: &str, method: &str) -> impl Iterator<Item = &RunRow> {
-        self.runs.iter().filter(move |run| run.scene == scene && run.method == method)
-    }
-
-    /// Returns the final costs over base of the runs of one method on one scene.
-    pub fn final_ratios(&self, scene: &str, method: &str) -> Vec<f64> {
-        self.runs_of(scene, method).map(|run| ratio(run.cost, run.base_cost)).collect()
-    }
-
-    /// Returns the seconds of the runs of one method on one scene.
-    pub fn seconds_of(&self, scene: &str, method: &str) -> Vec<f64> {
-        let own = self.timing.iter().filter(|row| row.scene == scene && row.method == method);
-        own.map(|row| row.seconds).collect()
-    }
-
     /// Returns the incumbents of every run of one method on one scene.
     pub fn series(&self, scene: &str, method: &str) -> Vec<Series> {
         let mut points = Vec::new();
@@ -159,10 +130,8 @@ impl Rows {
 
 /// Makes the row of an ordinary run on the scene `s`.
 #[cfg(test)]
-pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) -> RunRow {
-    let row = format!(
-        "s,file,{method},0,{repetition},100,{evaluations},{work},completed,1,1,1,1,1,1,1,199,9"
-    );
+pub(super) fn run(method: &str, repetition: u32) -> RunRow {
+    let row = format!("s,file,{method},0,{repetition},100,3,0,completed,1,1,1,1,1,1,1,199,9");
     csv::StringRecord::from_iter(row.split(',')).deserialize(None).unwrap()
 }
 

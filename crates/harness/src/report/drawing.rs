@@ -16,9 +16,6 @@ bvh_config::config! { serde;
         /// Conditions on the rows that are drawn.
         #[serde(skip_serializing_if = "String::is_empty")]
         select: String;
-        /// Conditions on the rows that are drawn before the others.
-        #[serde(skip_serializing_if = "String::is_empty")]
-        first: String;
         /// The shape of the marks.
         marks: Shape;
         /// Columns whose values are the panels; by default there is one panel.
@@ -88,8 +85,7 @@ struct Point {
 
 impl Drawing {
     fn check_conditions(&self) -> Result<(), OutOfRange> {
-        accept("select", Conditions::parse(&self.select))?;
-        accept("first", Conditions::parse(&self.first))
+        accept("select", Conditions::parse(&self.select))
     }
 
     /// Adds the figure of a report's first table, in place of the report's own of this name.
@@ -113,14 +109,11 @@ impl Drawing {
             let mut named = columns.filter(|name| !name.is_empty());
             named.try_for_each(|name| cell(row, name).map(drop))?;
         }
-        let selected = match query::select(table, &self.select) {
+        match query::select(table, &self.select) {
             // A figure may be of rows that these runs lack, such as those of quick variants.
-            Err(QueryError::NoRow(_)) => vec![],
-            selected => selected?,
-        };
-        let (mut table, others) = query::split(selected, &self.first)?;
-        table.extend(others);
-        Ok(table)
+            Err(QueryError::NoRow(_)) => Ok(vec![]),
+            selected => selected,
+        }
     }
 
     /// Returns one panel for all rows that agree in the columns `panels`.
@@ -145,7 +138,6 @@ impl Drawing {
         self.panels.iter().map(name).collect::<Vec<_>>().join(": ")
     }
 
-    /// Draws a line per series through the values in the column `y`.
     fn lines(&self, title: &str, y: &str, table: &[&Row]) -> Panel {
         let mut layers = Vec::new();
         for (series, table) in grouped(table.iter().copied(), |row| self.series_of(row)) {
@@ -205,13 +197,11 @@ impl Drawing {
         self.names.get(&name).cloned().unwrap_or(name)
     }
 
-    /// Returns the name in words of a text in a column.
     fn shown(&self, rows: &Rows, column: &str, text: &str) -> String {
         let own = self.names.get(text).cloned();
         own.unwrap_or_else(|| if column == "scene" { rows.shown(text) } else { text.into() })
     }
 
-    /// Returns the points of some rows, by x.
     fn points(&self, column: &str, table: &[&Row]) -> Vec<Point> {
         let point = |row: &&Row| {
             let (x, y) = (number_in(row, &self.x)?, number_in(row, column)?);
@@ -222,7 +212,6 @@ impl Drawing {
         points
     }
 
-    /// Returns the ends of the interval of the value in a column.
     fn ends_in(&self, row: &Row, column: &str) -> Option<(f64, f64)> {
         let end = |end: &str| number_in(row, &format!("{column}{end}"));
         let is_last = self.y.split(", ").last() == Some(column);
@@ -339,12 +328,8 @@ b,x,8,7,9,16,6,,1
                 ],
             ),
             (
-                "marks = 'points'\nx = 'seconds'\ny = 'base_cost'\npanels = ['scene']\nfirst = 'scene=b'",
-                &["b ;  Points([(1.0, 16.0)])", "a ;  Points([(1.0, 4.0), (2.0, 4.0)])"],
-            ),
-            (
-                "marks = 'points'\nx = 'seconds'\ny = 'base_cost'\npanels = ['scene']\nfirst = 'cost=max'",
-                &["b ;  Points([(1.0, 16.0)])", "a ;  Points([(1.0, 4.0), (2.0, 4.0)])"],
+                "marks = 'points'\nx = 'seconds'\ny = 'base_cost'\npanels = ['scene']",
+                &["a ;  Points([(1.0, 4.0), (2.0, 4.0)])", "b ;  Points([(1.0, 16.0)])"],
             ),
             (
                 "marks = 'points'\nx = 'cost'\ny = 'base_cost'\nselect = 'seconds=max'",

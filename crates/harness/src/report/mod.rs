@@ -1,17 +1,13 @@
 //! Reports made from an experiment's CSV files: tables, figures, and comparisons with the paper.
 //!
-//! A kind of report is one file and one line in [`Report`]. Reports read CSV files only.
+//! A kind of report is one file and a variant of [`Report`]. Reports read CSV files only.
 
 pub mod anytime;
 mod colours;
 pub mod config;
-mod correlation;
 pub mod data;
-pub mod distribution;
 pub mod drawing;
-pub mod gaps;
 pub mod generations;
-pub mod numbers;
 pub mod output;
 pub mod paper;
 mod prelude;
@@ -19,13 +15,11 @@ pub mod query;
 mod query_column;
 pub mod query_measure;
 pub mod query_report;
-mod ray_cost;
-pub mod table;
 pub mod trials;
 
 use crate::Error;
 use crate::rows::store::Store;
-use crate::rows::{Row as _, RunRow, TimingRow};
+use crate::rows::{ReferenceRow, Row as _, RunRow, TimingRow};
 use bvh_config::{Check, OutOfRange};
 use config::Labels as _;
 use data::Rows;
@@ -35,100 +29,83 @@ use query_column::Column;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
-/// Declares the kinds of reports: name in specs (in snake case), configuration and its keys that
-/// name methods, and the function that makes it.
-macro_rules! reports {
-    ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty: $($label:ident),*) by $write:path;)*) => {
-        /// One report of a spec.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[serde(tag = "kind")]
-        #[allow(clippy::large_enum_variant, reason = "a spec has few reports")]
-        pub enum Report {
-            $($(#[$doc])* #[serde(rename = $name)] $kind($config),)*
-        }
-
-        impl Check for Report {
-            fn check(&self) -> Result<(), OutOfRange> {
-                match self {
-                    $(Self::$kind(config) => config.check(),)*
-                }
-            }
-        }
-
-        impl Report {
-            fn name(&self) -> &'static str {
-                match self {
-                    $(Self::$kind(_) => $name,)*
-                }
-            }
-
-            /// The names of all kinds.
-            pub const NAMES: &[&str] = &[$($name),*];
-
-            /// Reads the configuration of a report of the kind `name`; `None` if there is none of
-            /// this name. Unlike deserialising a whole report, hands `config` on unbuffered, so
-            /// that its errors know their place.
-            pub fn read<'de, D: Deserializer<'de>>(name: &str, config: D) -> Result<Option<Self>, D::Error> {
-                match name {
-                    $($name => <$config>::deserialize(config).map(|config| Some(Self::$kind(config))),)*
-                    _ => Ok(None),
-                }
-            }
-
-            /// The labels of the methods that the report names, each with its key.
-            pub fn labels(&self) -> Vec<(String, &str)> {
-                match self {
-                    $(Self::$kind(config) => {
-                        let lines = config.figure.as_ref().map(|figure| figure.lines.labels("figure.lines"));
-                        let own = [$(config.$label.labels(stringify!($label))),*].concat();
-                        own.into_iter().chain(lines.into_iter().flatten()).collect()
-                    })*
-                }
-            }
-
-            fn write(&self, rows: &Rows) -> Result<Output, Error> {
-                match self {
-                    $(Self::$kind(config) => config.finish($write(config, rows)?, rows),)*
-                }
-            }
-        }
-    };
+/// One report of a spec.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+#[allow(clippy::large_enum_variant, reason = "a spec has few reports")]
+pub enum Report {
+    /// The best of so many trials.
+    Trials(trials::Config),
+    /// Cost against generation.
+    Generations(generations::Config),
+    /// Error against run time.
+    Anytime(anytime::Config),
+    /// Rows of a CSV file of a run or of an earlier report, selected, grouped, aggregated and drawn.
+    Query(query_report::Config),
 }
 
-reports! {
-    /// Ratios to base, scenes by columns, compared with the paper's.
-    "table" => Table(table::Config: columns) by table::Config::write;
-    /// Cost against number of trials.
-    "trials" => Trials(trials::Config: methods) by trials::Config::write;
-    /// Cost against generation.
-    "generations" => Generations(generations::Config: method, baseline) by generations::Config::write;
-    /// The distribution of costs over trials.
-    "distribution" => Distribution(distribution::Config: methods) by distribution::write;
-    /// Costs against tests per ray over the trees of each method; every repetition is one tree.
-    "correlation" => Correlation(correlation::Config: methods) by correlation::write;
-    /// Error against run time.
-    "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write;
-    /// Gaps to the exact optimum of small scenes.
-    "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write;
-    /// Medians, quartiles, and seconds until targets are reached.
-    "numbers" => Numbers(numbers::Config: methods) by numbers::Config::write;
-    /// Tests of rays in trees that are trained on rays.
-    "ray_cost" => RayCost(ray_cost::Config: base, pairs) by ray_cost::Config::write;
-    /// Rows of a CSV file of a run or of an earlier report, selected, grouped, aggregated and drawn.
-    "query" => Query(query_report::Config: pairs) by query_report::Config::write;
+impl Check for Report {
+    fn check(&self) -> Result<(), OutOfRange> {
+        match self {
+            Self::Trials(config) => config.check(),
+            Self::Generations(config) => config.check(),
+            Self::Anytime(config) => config.check(),
+            Self::Query(config) => config.check(),
+        }
+    }
 }
 
 impl Report {
+    /// The names of all kinds.
+    pub const NAMES: &[&str] = &["trials", "generations", "anytime", "query"];
+
+    /// Reads the configuration of a report of the kind `name`; `None` if there is none of this
+    /// name. Unlike deserialising a whole report, hands `config` on unbuffered, so that its errors
+    /// know their place.
+    pub fn read<'de, D: Deserializer<'de>>(
+        name: &str,
+        config: D,
+    ) -> Result<Option<Self>, D::Error> {
+        Ok(Some(match name {
+            "trials" => Self::Trials(Deserialize::deserialize(config)?),
+            "generations" => Self::Generations(Deserialize::deserialize(config)?),
+            "anytime" => Self::Anytime(Deserialize::deserialize(config)?),
+            "query" => Self::Query(Deserialize::deserialize(config)?),
+            _ => return Ok(None),
+        }))
+    }
+
+    fn write(&self, rows: &Rows) -> Result<Output, Error> {
+        match self {
+            Self::Trials(config) => config.finish(config.write(rows)?, rows),
+            Self::Generations(config) => config.finish(config.write(rows)?, rows),
+            Self::Anytime(config) => config.finish(config.write(rows)?, rows),
+            Self::Query(config) => config.finish(config.write(rows)?, rows),
+        }
+    }
+
+    /// Returns the labels of the methods that the report names, each with its key.
+    pub fn labels(&self) -> Vec<(String, &str)> {
+        let (own, figure) = match self {
+            Self::Trials(config) => (config.methods.labels("methods"), &config.figure),
+            Self::Generations(config) => {
+                let baseline = config.baseline.labels("baseline");
+                ([config.method.labels("method"), baseline].concat(), &config.figure)
+            }
+            Self::Anytime(config) => (config.methods.labels("methods"), &config.figure),
+            Self::Query(config) => (config.pairs.labels("pairs"), &config.figure),
+        };
+        let lines = figure.iter().flat_map(|figure| figure.lines.labels("figure.lines"));
+        own.into_iter().chain(lines).collect()
+    }
+
     /// Returns the labels of the methods whose single trials the report reads; `history.csv`
     /// suffices for all others.
-    pub fn trial_methods(&self) -> Vec<&str> {
+    pub fn trial_methods(&self) -> Vec<String> {
         match self {
-            Self::Trials(trials::Config { methods, .. })
-            | Self::Distribution(distribution::Config { methods, .. }) => {
-                methods.iter().map(String::as_str).collect()
-            }
-            Self::Generations(config) => vec![&config.method, &config.baseline],
-            Self::Table(config) => config.trial_methods(),
+            Self::Trials(config) => config.methods.clone(),
+            Self::Generations(config) => vec![config.method.clone(), config.baseline.clone()],
+            Self::Query(config) => config.trial_methods(),
             _ => vec![],
         }
     }
@@ -136,17 +113,10 @@ impl Report {
     /// Returns the CSV files that the report makes; those of its figures have their names.
     pub fn files(&self) -> Vec<String> {
         let names = match self {
-            Self::Anytime(config) => return vec![format!("{}.csv", config.csv())],
-            Self::Numbers(config) if config.targets.is_empty() => {
-                vec!["numbers", "timing_numbers"]
-            }
-            Self::Numbers(_) => vec!["numbers", "timing_numbers", "timing_to_target"],
-            Self::RayCost(config) if !config.pairs.is_empty() => {
-                vec!["ray_cost", "ray_cost_pairs"]
-            }
-            Self::Query(config) => vec![config.file.as_str()],
-            // The others make one file, of their name.
-            report => vec![report.name()],
+            Self::Trials(_) => vec!["trials".to_owned()],
+            Self::Generations(_) => vec!["generations".to_owned()],
+            Self::Anytime(config) => config.names(),
+            Self::Query(config) => vec![config.file.clone()],
         };
         names.into_iter().map(|name| format!("{name}.csv")).collect()
     }
@@ -160,7 +130,8 @@ impl Report {
 
     /// Returns true if the report measures gaps, for which it needs the times of events.
     pub fn needs_references(&self) -> bool {
-        matches!(self, Self::Anytime(_) | Self::Numbers(_))
+        matches!(self, Self::Anytime(_))
+            || self.reads().iter().any(|(_, file)| *file == ReferenceRow::FILE)
     }
 }
 
@@ -229,7 +200,6 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
     Ok(Output { unwritten, ..Output::new("", "Final costs over those of the greedy tree") })
 }
 
-/// Collects the comparisons with the paper of all reports.
 fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
     output.add_csv("paper", rows)?;
@@ -243,14 +213,10 @@ mod tests {
 
     #[test]
     fn the_figure_of_a_spec_replaces_the_one_of_its_kind() {
-        for (kind, keys) in
-            [("generations", "method = 'a'\nbaseline = 'b'"), ("anytime", "methods = ['a']")]
-        {
-            let text = format!("kind = '{kind}'\n{keys}\nfigure = {{ caption = 'mine' }}");
-            let report: Report = toml::from_str(&text).unwrap();
-            let figures = report.write(&Rows::default()).unwrap().figures;
-            let captions: Vec<&str> = figures.iter().map(|(_, figure)| &*figure.caption).collect();
-            assert_eq!(captions, ["mine"], "{kind}");
-        }
+        let text = "kind = 'anytime'\nmethods = ['a']\nfigure = { caption = 'mine' }";
+        let report: Report = toml::from_str(text).unwrap();
+        let figures = report.write(&Rows::default()).unwrap().figures;
+        let captions: Vec<&str> = figures.iter().map(|(_, figure)| &*figure.caption).collect();
+        assert_eq!(captions, ["mine"]);
     }
 }

@@ -12,7 +12,7 @@ pub struct PaperRow {
     pub scene: String,
     /// The quantity that is compared.
     pub quantity: String,
-    /// The paper's number or words; empty if it has none and the row only adds to the others.
+    /// The paper's number or words.
     pub paper: String,
     /// Our number or words.
     pub ours: String,
@@ -49,6 +49,52 @@ impl PaperRow {
         rule: impl Into<String>,
     ) -> Self {
         Self { paper: paper.into(), ours: ours.into(), verdict, rule: rule.into(), ..self }
+    }
+
+    /// Adds the paper's and our ratio to base by the closest of several readings, and the verdict.
+    #[must_use]
+    pub fn compare_reading(self, paper: f64, ours: f64, reading: &str, tolerance: f64) -> Self {
+        // The paper prints no formula, so the closest reading is the most favourable to it.
+        let is_close = (ours / paper - 1.0).abs() <= tolerance;
+        let row = self.compare(
+            format!("{paper:.4}"),
+            format!("{ours:.4}, by {reading}"),
+            if is_close { Verdict::Inconclusive } else { Verdict::Differs },
+            format!(
+                "differs if no reading is within {} % of the paper's; the paper prints no formula, \
+                 so that a reading which is within cannot be distinguished from the paper's",
+                100.0 * tolerance
+            ),
+        );
+        Self { paper_over_base: Some(paper), ours_over_base: Some(ours), ..row }
+    }
+
+    /// Adds the paper's words and our value, and the verdict on them. The words hold if the whole
+    /// interval of our value lies from the number `from` on; without one there is no verdict.
+    #[must_use]
+    pub fn compare_words(
+        self,
+        says: &str,
+        ours: f64,
+        interval: Option<(f64, f64)>,
+        from: Option<f64>,
+    ) -> Self {
+        let (low, high) = interval.unwrap_or((ours, ours));
+        let (verdict, rule) = match from {
+            None => (Verdict::NoVerdict, "the paper gives no number".to_owned()),
+            Some(from) => {
+                let verdict = match (low >= from, high < from) {
+                    (true, _) => Verdict::Agrees,
+                    (_, true) => Verdict::Differs,
+                    _ => Verdict::Inconclusive,
+                };
+                let rule = "its whole interval lies from";
+                (verdict, format!("{rule} {from} on; it differs if the interval lies below"))
+            }
+        };
+        let row = self.compare(says, format!("{ours:.3}"), verdict, rule);
+        let (ours_low, ours_high) = interval.unzip();
+        Self { ours_low, ours_high, ..row }
     }
 
     /// Adds the paper's and our ratio to base, and the verdict on them. Our ratio has an interval
@@ -109,12 +155,9 @@ pub enum Verdict {
     #[serde(rename = "inconclusive")]
     Inconclusive,
     /// The paper has words and no number, so no data could lead to another verdict.
+    #[default]
     #[serde(rename = "no verdict")]
     NoVerdict,
-    /// The paper has no such statement.
-    #[default]
-    #[serde(rename = "not in the paper")]
-    NotInPaper,
 }
 
 impl Verdict {

@@ -6,9 +6,12 @@
 //!              COLUMN<NUMBER, COLUMN>NUMBER           rows with a number in the column
 //!              COLUMN=max                             rows with the greatest number of the column
 //! MEASURE      AGGREGATE VALUE
-//!              spearman VALUE, VALUE                  the rank correlation; also pearson
-//! AGGREGATE    only (all rows agree), first, min, max, sum, median, geomean, count
-//! VALUE        COLUMN, COLUMN / COLUMN * 1e-6, …      computed row by row, from left to right
+//!              spearman VALUE, VALUE                  the rank correlation; also pearson, and the
+//!                                                     ends of its interval, pearson_low and _high
+//! AGGREGATE    only (all rows agree), first, min, max, sum, mean, median, q25 (and other quantiles in
+//!              per cent), geomean, variation (standard deviation / mean), count
+//! VALUE        COLUMN, COLUMN / COLUMN * 1e-6, …      computed row by row, from left to right, with
+//!              + - * / and <, which is 1 or 0
 //! ```
 
 use indexmap::IndexMap;
@@ -127,6 +130,12 @@ impl Conditions {
         self.0.iter().map(|condition| condition.column.as_str())
     }
 
+    /// Returns the texts that a column must have one of; none if any will do.
+    pub fn texts_of(&self, column: &str) -> &[String] {
+        let is_own = |condition: &&Condition| condition.column == column && condition.sign == "=";
+        self.0.iter().find(is_own).map_or(&[], |condition| &condition.texts)
+    }
+
     /// Returns the texts of the conditions.
     pub fn texts(&self) -> Vec<&str> {
         let texts = self.0.iter().flat_map(|condition| &condition.texts);
@@ -139,41 +148,49 @@ impl Conditions {
     }
 }
 
-/// Returns the rows that meet all conditions, and the others.
-pub fn split(rows: Vec<Row>, conditions: &str) -> Result<(Vec<Row>, Vec<Row>), QueryError> {
+/// Returns the rows that meet all conditions; at least one.
+pub fn select(rows: Vec<Row>, conditions: &str) -> Result<Vec<Row>, QueryError> {
     let mut parsed = Conditions::parse(conditions)?;
     for condition in &mut parsed.0 {
         condition.resolve(&rows)?;
     }
-    let (mut met, mut others) = (Vec::new(), Vec::new());
+    let mut selected = Vec::new();
     for row in rows {
-        if parsed.are_met(&row)? { met.push(row) } else { others.push(row) }
+        selected.extend(parsed.are_met(&row)?.then_some(row));
     }
-    Ok((met, others))
-}
-
-/// Returns the rows that meet all conditions; at least one.
-pub fn select(rows: Vec<Row>, conditions: &str) -> Result<Vec<Row>, QueryError> {
-    let (selected, _) = split(rows, conditions)?;
     if selected.is_empty() {
         return Err(QueryError::NoRow(conditions.into()));
     }
     Ok(selected)
 }
 
-/// Returns each row with the columns of every other row that agrees with it in all common columns.
-/// The rows of either list have the same columns.
-pub fn join(rows: &[Row], others: &[Row]) -> Result<Vec<Row>, QueryError> {
+/// Returns each row with the columns of every row of the file `name` that agrees with it in the
+/// columns `by`, or in all common columns if there are none. A column of both files that they need
+/// not agree in is called `name.COLUMN`. The rows of either list have the same columns.
+pub fn join(
+    rows: &[Row],
+    name: &str,
+    others: &[Row],
+    by: &[String],
+) -> Result<Vec<Row>, QueryError> {
     let Some((row, other)) = rows.first().zip(others.first()) else { return Ok(vec![]) };
-    let common = other.keys().filter(|column| row.contains_key(*column));
-    let common: Vec<&str> = common.map(String::as_str).collect();
+    let mut common: Vec<&str> = by.iter().map(String::as_str).collect();
+    if by.is_empty() {
+        common.extend(other.keys().map(String::as_str).filter(|column| row.contains_key(*column)));
+    }
     let others = grouped(others, &common)?;
     let mut joined = Vec::new();
     for row in rows {
         let values = common.iter().map(|column| cell(row, column).cloned());
         let agreeing = others.get(&values.collect::<Result<Vec<_>, _>>()?);
         for other in agreeing.into_iter().flatten() {
-            joined.push(row.clone().into_iter().chain((*other).clone()).collect());
+            let mut both = row.clone();
+            for (column, text) in *other {
+                let is_other = both.contains_key(column) && !common.contains(&column.as_str());
+                let column = if is_other { format!("{name}.{column}") } else { column.clone() };
+                both.insert(column, text.clone());
+            }
+            joined.push(both);
         }
     }
     Ok(joined)
@@ -227,7 +244,12 @@ mod tests {
             ),
             ("scene\n", &[]),
         ] {
-            assert_eq!(texts(join(&runs, &rows(others)).unwrap()), expected, "{others}");
+            let joined = join(&runs, "others", &rows(others), &[]).unwrap();
+            assert_eq!(texts(joined), expected, "{others}");
         }
+        let exact = rows("scene,method,cost\na,exact,1\n");
+        let joined = join(&runs, "exact", &exact, &["scene".to_owned()]).unwrap();
+        assert!(joined[0].keys().eq(["scene", "method", "cost", "exact.method", "exact.cost"]));
+        assert_eq!(texts(joined), ["a x 2 exact 1"]);
     }
 }

@@ -3,7 +3,7 @@
 
 use super::query::{Conditions, QueryError, Row};
 use super::query_measure::{Aggregate, Measure};
-use crate::statistics::{median_interval, range};
+use crate::statistics::{median_interval, range, student};
 use bvh_config::{Nested, above};
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +24,10 @@ bvh_config::config! { serde;
         /// Columns by which rows are paired with rows of the base, if quotients are computed pair
         /// by pair. A further column then holds the verdict of the interval.
         paired_by: Vec<String>;
+        /// For the quotient of two means, each of one row: the columns of their standard errors and
+        /// of the numbers of values, which give the quotient a 95 % interval and a verdict.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        error: Option<[String; 2]>;
         /// The paper's numbers, for a further column. Quotients of a file without seconds are also
         /// compared with them in `paper.csv`.
         paper: Vec<OfPaper>, in Nested;
@@ -31,14 +35,24 @@ bvh_config::config! { serde;
 }
 
 bvh_config::config! { serde;
-    /// A number of the paper.
+    /// A number or words of the paper.
     pub struct OfPaper {
-        /// Conditions on the row of the table that it belongs to.
+        /// Conditions on the row of the table that they belong to.
         row: String;
         /// The number.
         value: f64 = 1.0, in above(0.0);
         /// The paper's number for the base, which it is divided by.
         over: f64 = 1.0, in above(0.0);
+        /// True if all rows that meet the conditions are readings of one number, of which the
+        /// closest counts.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        readings: bool;
+        /// The words, if there is no number.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        says: String;
+        /// The least value for which the words hold.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        from: Option<f64>, in 0.0..=1e300;
     }
 }
 
@@ -88,19 +102,20 @@ impl Column {
             Some(ratio) => self.quotient(group, &measure, ratio)?,
         };
         let mut cells = vec![("", text_of(value))];
-        if self.ratio.is_some() && measure.how == Aggregate::Median {
+        let has_error = self.error.is_some();
+        if self.ratio.is_some() && (measure.how == Aggregate::Median || has_error) {
             let (low, high) = interval.unzip();
             cells.extend([("_low", text_of(low)), ("_high", text_of(high))]);
-            if !self.paired_by.is_empty() {
+            if has_error || !self.paired_by.is_empty() {
                 cells.push(("_verdict", verdict(interval).into()));
             }
         }
         for (end, text) in cells {
             put(row, format!("{}{end}", self.name), text)?;
         }
-        if !self.paper.is_empty() {
+        if self.paper.iter().any(|of_paper| of_paper.says.is_empty()) {
             let mut paper = None;
-            for OfPaper { row, value, over } in &self.paper {
+            for OfPaper { row, value, over, .. } in &self.paper {
                 if Conditions::parse(row)?.are_met(&group.key)? {
                     paper = Some(value / over);
                 }
@@ -120,6 +135,13 @@ impl Column {
             let own = measure.of_rows(&group.rows)?;
             let base = measure.of_rows(&group.base)?;
             let value = own.zip(base).map(|(own, base)| ratio.of(own, base));
+            if let Some(columns) = &self.error {
+                let error = relative_error(columns, &group.rows, own)?;
+                let both = error.zip(relative_error(columns, &group.base, base)?);
+                let half = both.map(|(own, base)| own.hypot(base));
+                let ends = |(value, half)| (value - value * half, value + value * half);
+                return Ok((value, value.zip(half).map(ends)));
+            }
             let of_all = |rows: &[&Row]| {
                 let values: Result<Vec<_>, _> =
                     rows.iter().map(|row| measure.of_row(row)).collect();
@@ -152,6 +174,18 @@ impl Column {
     }
 }
 
+/// Returns half the width of the 95 % interval of a mean, over the mean.
+fn relative_error(
+    [error, count]: &[String; 2],
+    rows: &[&Row],
+    mean: Option<f64>,
+) -> Result<Option<f64>, QueryError> {
+    let only = |column: &str| Measure::parse(&format!("only {column}"))?.of_rows(rows);
+    let factor = only(count)?.and_then(|count| student(count as usize));
+    let error = only(error)?.zip(mean).map(|(error, mean)| error / mean);
+    Ok(factor.zip(error).map(|(factor, error)| factor * error))
+}
+
 fn put(row: &mut Row, name: String, text: String) -> Result<(), QueryError> {
     let accepted = "a name of a column that no other has";
     match row.insert(name.clone(), text) {
@@ -160,7 +194,6 @@ fn put(row: &mut Row, name: String, text: String) -> Result<(), QueryError> {
     }
 }
 
-/// Returns the verdict of an interval of quotients.
 fn verdict(interval: Option<(f64, f64)>) -> &'static str {
     match interval {
         Some((_, high)) if high < 1.0 => "lower",

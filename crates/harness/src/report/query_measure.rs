@@ -1,7 +1,9 @@
 //! The measures of the query language: an aggregate of a value that is computed row by row.
 
 use super::query::{QueryError, Row, cell};
-use crate::statistics::{geometric_mean, median, pearson, range, spearman};
+use crate::statistics::{
+    geometric_mean, mean, pearson, pearson_interval, quantile, range, spearman, variance,
+};
 use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::{Error, StrDeserializer};
@@ -20,22 +22,42 @@ pub enum Aggregate {
     Max,
     /// The sum.
     Sum,
+    /// The mean.
+    Mean,
     /// The median.
     Median,
+    /// The quantile of so many per cent.
+    #[serde(skip)]
+    Quantile(u8),
     /// The geometric mean.
     Geomean,
+    /// The standard deviation over the mean.
+    Variation,
     /// The number of rows, whatever they hold.
     Count,
     /// Pearson's correlation of two values.
     Pearson,
+    /// Lower end of its 95 % interval.
+    PearsonLow,
+    /// The upper end.
+    PearsonHigh,
     /// Spearman's rank correlation of two values.
     Spearman,
 }
 
 impl Aggregate {
+    fn parse(name: &str) -> Option<Self> {
+        let percent = name.strip_prefix('q').and_then(|percent| percent.parse().ok());
+        if let Some(percent @ 1..=99) = percent {
+            return Some(Self::Quantile(percent));
+        }
+        let name: StrDeserializer<Error> = name.into_deserializer();
+        Self::deserialize(name).ok()
+    }
+
     /// Returns true for correlations, which need two values of every row.
     fn is_of_pairs(self) -> bool {
-        matches!(self, Self::Pearson | Self::Spearman)
+        matches!(self, Self::Pearson | Self::PearsonLow | Self::PearsonHigh | Self::Spearman)
     }
 }
 
@@ -53,12 +75,11 @@ impl<'t> Measure<'t> {
         let malformed = || QueryError::Malformed {
             part: "measure",
             found: text.into(),
-            accepted: "only, first, min, max, sum, median, geomean, count, and a column; pearson, \
-                       spearman, and two",
+            accepted: "only, first, min, max, sum, mean, median, q25, geomean, variation, count, \
+                       and a column; pearson, pearson_low, pearson_high, spearman, and two",
         };
         let (name, rest) = text.split_once(' ').ok_or_else(malformed)?;
-        let name: StrDeserializer<Error> = name.into_deserializer();
-        let how = Aggregate::deserialize(name).map_err(|_| malformed())?;
+        let how = Aggregate::parse(name).ok_or_else(malformed)?;
         let values: Vec<&str> =
             if how.is_of_pairs() { rest.split(", ").collect() } else { vec![rest] };
         if values.len() != 1 + usize::from(how.is_of_pairs()) {
@@ -85,8 +106,13 @@ impl<'t> Measure<'t> {
         let numbers = numbers.into_iter().flatten();
         if self.how.is_of_pairs() {
             let pairs: Vec<_> = numbers.map(|numbers| (numbers[0], numbers[1])).collect();
-            let is_pearson = self.how == Aggregate::Pearson;
-            return Ok(if is_pearson { pearson(&pairs) } else { spearman(&pairs) });
+            let interval = || pearson_interval(pearson(&pairs)?, pairs.len());
+            return Ok(match self.how {
+                Aggregate::Pearson => pearson(&pairs),
+                Aggregate::PearsonLow => interval().map(|ends| ends.0),
+                Aggregate::PearsonHigh => interval().map(|ends| ends.1),
+                _ => spearman(&pairs),
+            });
         }
         self.of_values(&numbers.flatten().collect::<Vec<_>>())
     }
@@ -103,9 +129,14 @@ impl<'t> Measure<'t> {
             Aggregate::Min => Some(least),
             Aggregate::Max => Some(most),
             Aggregate::Sum => Some(values.iter().sum()),
-            Aggregate::Median => median(values),
+            Aggregate::Mean => Some(mean(values.iter().copied())),
+            Aggregate::Median => quantile(values, 0.5),
+            Aggregate::Quantile(percent) => quantile(values, f64::from(percent) / 100.0),
             Aggregate::Geomean => Some(geometric_mean(values)),
-            Aggregate::Count | Aggregate::Pearson | Aggregate::Spearman => {
+            Aggregate::Variation => {
+                variance(values).map(|variance| variance.sqrt() / mean(values.iter().copied()))
+            }
+            _ => {
                 let accepted = "an aggregate of one value of every row";
                 let found = self.text.into();
                 return Err(QueryError::Malformed { part: "ratio", found, accepted });
@@ -123,11 +154,13 @@ fn number(row: &Row, value: &str) -> Result<Option<f64>, QueryError> {
         let Some((left, right)) = result.zip(other) else { return Ok(None) };
         result = Some(match operator {
             "+" => left + right,
+            "-" => left - right,
             "*" => left * right,
             "/" => left / right,
+            "<" => f64::from(left < right),
             _ => {
                 let found = value.into();
-                let accepted = "columns and numbers with +, * or / between blanks";
+                let accepted = "columns and numbers with +, -, *, / or < between blanks";
                 return Err(QueryError::Malformed { part: "value", found, accepted });
             }
         });
@@ -168,6 +201,10 @@ mod tests {
         assert_eq!(value("cost>2, cost<5", "only cost"), Ok(Some(3.0)));
         assert_eq!(value("scene=a", "min cost / rays"), Ok(Some(0.5)));
         assert_eq!(value("scene=b", "only rays"), Ok(None));
+        assert_eq!(value("*", "q25 cost - 1"), Ok(Some(1.5)));
+        assert_eq!(value("*", "mean cost < 5 * 3"), Ok(Some(2.0)));
+        assert_eq!(value("cost<5", "variation cost"), Ok(Some(0.5f64.sqrt() / 2.5)));
+        assert_eq!(value("*", "pearson_low cost, cost"), Ok(None));
     }
 
     #[test]
@@ -176,7 +213,7 @@ mod tests {
             ("scene", "only cost", &["\"scene\" is no condition", "COLUMN=TEXT"][..]),
             ("colour=red", "only cost", &["no column \"colour\"", "scene, method, cost, rays"]),
             ("scene=c", "only cost", &["no row meets \"scene=c\""]),
-            ("*", "mean cost", &["\"mean cost\" is no measure", "median"]),
+            ("*", "modal cost", &["\"modal cost\" is no measure", "median"]),
             ("*", "only cost", &["cost has several values, from 2 to 5"]),
         ] {
             let message = value(conditions, measure).unwrap_err().to_string();

@@ -8,6 +8,7 @@ use super::prelude::*;
 use super::query::{self, Conditions, QueryError, Row, number_in};
 use super::query_column::{Column, Group};
 use super::query_measure::Measure;
+use crate::rows::{Row as _, TrialRow};
 use bvh_config::{Nested, OutOfRange};
 
 report! {
@@ -19,9 +20,16 @@ report! {
         /// The CSV file whose rows are read: of the experiment's runs, or of a report before this
         /// one.
         rows: String;
-        /// Another CSV file. Each row is joined with all its rows that agree in the columns of
-        /// both.
+        /// Another CSV file. Each row is joined with all its rows that agree in the columns
+        /// `join_by`.
         join: String;
+        /// Columns; by default all that both files have. Another column of both files is called
+        /// by the name of the second file, without extension, a dot and its own.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        join_by: Vec<String>;
+        /// Conditions on the rows of the second file.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        join_select: String;
         /// Conditions on the rows, such as `family=inside, rays=max`.
         select: String = "*".into();
         /// Columns by which rows are grouped: the first columns of the table.
@@ -47,7 +55,11 @@ impl Config {
             |error: QueryError| Error::Query { path: path.clone(), message: error.to_string() };
         let mut selected = rows.read_file(&self.rows)?;
         if !self.join.is_empty() {
-            selected = query::join(&selected, &rows.read_file(&self.join)?).map_err(named)?;
+            let others = query::select(rows.read_file(&self.join)?, &self.join_select);
+            let name = self.join.trim_end_matches(".csv");
+            selected = others
+                .and_then(|others| query::join(&selected, name, &others, &self.join_by))
+                .map_err(named)?;
         }
         let selected = query::select(selected, &self.select).map_err(named)?;
         let table = self.table(&selected).map_err(named)?;
@@ -55,6 +67,15 @@ impl Config {
         output.csv.push((self.file.clone(), table_bytes(&table)?));
         output.paper = self.compare(rows, &table).map_err(named)?;
         Ok(output)
+    }
+
+    /// Returns the labels of the methods whose single trials the table is of.
+    pub(super) fn trial_methods(&self) -> Vec<String> {
+        if self.rows != TrialRow::FILE {
+            return vec![];
+        }
+        let select = Conditions::parse(&self.select);
+        select.map_or(vec![], |conditions| conditions.texts_of("method").to_vec())
     }
 
     fn table(&self, rows: &[Row]) -> Result<Vec<Row>, QueryError> {
@@ -100,7 +121,6 @@ impl Config {
         Ok(groups)
     }
 
-    /// Compares cells with the paper's numbers.
     fn compare(&self, rows: &Rows, table: &[Row]) -> Result<Vec<PaperRow>, QueryError> {
         let mut compared = Vec::new();
         // `paper.csv` must have the same bytes on every machine, which seconds have not.
@@ -111,17 +131,32 @@ impl Config {
             for of_paper in &column.paper {
                 let conditions = Conditions::parse(&of_paper.row)?;
                 let paper = of_paper.value / of_paper.over;
+                let mut found = Vec::new();
                 for row in table {
+                    let is_own = conditions.are_met(row)?;
                     let number = |end: &str| number_in(row, &format!("{}{end}", column.name));
-                    let Some(ours) = number("") else { continue };
-                    if !conditions.are_met(row)? {
-                        continue;
-                    }
+                    let ours = number("").filter(|_| is_own);
+                    found.extend(ours.map(|ours| (row, ours, number("_low").zip(number("_high")))));
+                }
+                if of_paper.readings {
+                    let distance = |ours: f64| (ours / paper).ln().abs();
+                    found.sort_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
+                    found.truncate(1);
+                }
+                for (row, ours, interval) in found {
                     let scene = row.get("scene").map_or(String::new(), |scene| rows.shown(scene));
-                    let quantity = format!("{}, {}", column.label(), self.subject(row));
-                    let interval = number("_low").zip(number("_high"));
+                    let subject = self.subject(row);
+                    let of = if of_paper.readings { "the closest reading" } else { &subject };
+                    let quantity = format!("{}, {of}", column.label());
+                    let quantity = quantity.trim_end_matches(", ");
                     let row = PaperRow::new(scene, quantity);
-                    compared.push(row.compare_ratios(paper, ours, interval, self.tolerance));
+                    compared.push(match &*of_paper.says {
+                        "" if of_paper.readings => {
+                            row.compare_reading(paper, ours, &subject, self.tolerance)
+                        }
+                        "" => row.compare_ratios(paper, ours, interval, self.tolerance),
+                        says => row.compare_words(says, ours, interval, of_paper.from),
+                    });
                 }
             }
         }
@@ -130,7 +165,7 @@ impl Config {
 
     /// Names a row of the table without its scene, and the base that it is compared with.
     fn subject(&self, row: &Row) -> String {
-        let names = self.by.iter().filter(|column| *column != "scene");
+        let names = self.by.iter().filter(|column| !column.starts_with("scene"));
         let own = names.map(|column| row[column].as_str()).collect::<Vec<_>>().join(", ");
         let base =
             Conditions::parse(&self.base).map_or(String::new(), |base| base.texts().join(", "));
@@ -146,7 +181,12 @@ impl Config {
     /// read. Columns are known only when the rows are.
     fn check_queries(&self) -> Result<(), OutOfRange> {
         check_file("", &self.file)?;
+        if self.rows == TrialRow::FILE && self.trial_methods().is_empty() {
+            let accepted = "`method=LABEL or LABEL`, the methods whose trials are kept";
+            return Err(OutOfRange::new("select", format!("{:?}", self.select), accepted));
+        }
         accept("select", Conditions::parse(&self.select))?;
+        accept("join_select", Conditions::parse(&self.join_select))?;
         accept("base", Conditions::parse(&self.base))?;
         for (index, column) in self.columns.iter().enumerate() {
             accept(&format!("columns[{index}].value"), Measure::parse(&column.value))?;
@@ -168,6 +208,7 @@ fn agree(row: &Row, key: &Row, free: &[&str]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::paper::Verdict;
     use bvh_config::Check;
     use figures::Scale;
 
@@ -234,19 +275,57 @@ mod tests {
     }
 
     #[test]
+    fn several_readings_of_a_number_of_the_paper_are_one_row_by_the_closest() {
+        let readings = |paper| {
+            let paper =
+                format!("paper = [{{ row = 'scene=s', value = {paper}, readings = true }}]");
+            let columns = format!("columns = [{{ name = 'r', value = 'min cost', {paper} }}]");
+            let [row] = &made(&columns).unwrap().paper[..] else { panic!("one row") };
+            (row.ours.clone(), row.verdict)
+        };
+        // A reading that comes close may still not be the paper's.
+        assert_eq!(readings(5.1), ("5.0000, by b".to_owned(), Verdict::Inconclusive));
+        assert_eq!(readings(14.0), ("10.0000, by a".to_owned(), Verdict::Differs));
+    }
+
+    #[test]
+    fn quotients_of_means_have_the_interval_of_both_errors() {
+        let columns = "base = 'method=a'\nselect = 'repetition=4'\ncolumns = [{ name = 'r', \
+                       value = 'only cost', ratio = 'over_base', \
+                       error = ['repetition', 'repetition'] }]";
+        // Half the width is 3.182 (Student's, of four) times 0.7 and the hypotenuse of 4/10 and 4/7.
+        let output = made(columns).unwrap();
+        assert!(csv(&output).contains("\ns,b,0.7,-0.853"), "{}", csv(&output));
+        assert!(csv(&output).ends_with(",inconclusive\n"), "{}", csv(&output));
+    }
+
+    #[test]
+    fn words_of_the_paper_hold_from_a_number_on() {
+        let verdict = |from| {
+            let paper = format!("paper = [{{ row = 'method=b', says = 'most', from = {from} }}]");
+            let columns = format!("columns = [{{ name = 'r', value = 'mean cost < 7', {paper} }}]");
+            let output = made(&columns).unwrap();
+            assert!(csv(&output).ends_with("s,b,0.6666666666666666\n"), "{}", csv(&output));
+            output.paper[0].verdict
+        };
+        assert_eq!((verdict(0.5), verdict(0.7)), (Verdict::Agrees, Verdict::Differs));
+    }
+
+    #[test]
     fn files_of_runs_and_queries_that_cannot_be_read_are_rejected_by_key() {
         for (change, key) in [
             // Runs would be lost.
             ("file = 'runs'", "file"),
+            ("rows = 'trial_costs.csv'", "select"),
             ("select = 'method'", "select"),
             ("base = 'work<much'", "base"),
-            ("columns = [{ name = 'c', value = 'mean cost' }]", "columns[0].value"),
+            ("join_select = 'method'", "join_select"),
+            ("columns = [{ name = 'c', value = 'modal cost' }]", "columns[0].value"),
             (
                 "columns = [{ value = 'max cost', paper = [{ row = 'escher' }] }]",
                 "columns[0].paper[0].row",
             ),
             ("figure = { select = 'scene' }", "figure.select"),
-            ("figure = { first = 'cost>much' }", "figure.first"),
         ] {
             let mut config: toml::Table =
                 "file = 'x'\nrows = 'runs.csv'\nby = ['scene']".parse().unwrap();
@@ -263,11 +342,15 @@ mod tests {
             ("base = 'method=A'", "no row meets \"method=A\""),
             ("columns = [{ name = 'c', value = 'max work' }]", "no column \"work\""),
             (
-                "columns = [{ name = 'c', value = 'max cost - cost' }]",
-                "\"cost - cost\" is no value",
+                "columns = [{ name = 'c', value = 'max cost ^ cost' }]",
+                "\"cost ^ cost\" is no value",
             ),
             ("columns = [{ name = 'scene', value = 'max cost' }]", "\"scene\" is no name"),
             ("figure = { x = 'cost', y = 'scene' }", "figure: there is no column \"cost\""),
+            (
+                "columns = [{ name = 'c', value = 'max cost', paper = [{ row = 'k=1', value = 1.0 }] }]",
+                "no column \"k\"",
+            ),
         ] {
             let error = made(change).unwrap_err();
             assert!(error.contains(message), "{error}");

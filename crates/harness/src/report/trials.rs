@@ -1,31 +1,41 @@
-//! Figure 1 of the paper: cost against number of trials, for one run and as an exact expectation.
+//! The best of so many trials: of one run as in figure 1 of the paper, the median of all blocks of
+//! so many trials, and as an exact expectation.
 
-use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use crate::statistics::{expected_best_of, mean_interval, minimum};
+use crate::statistics::best_of::predicted_best;
+use crate::statistics::{expected_best_of, mean_interval, median, minimum};
 
 report! {
     /// Cost against number of trials.
     pub struct Config {
         /// Labels of the methods to compare.
         methods: Vec<String>, in OneOrMore;
-        /// Number of trials whose best is compared, and at which figures end. Use fewer than are
-        /// run: the expectation needs a pool to draw from.
+        /// The greatest number of trials. Use fewer than are run: the expectation needs a pool to
+        /// draw from.
         best_of: usize = 100, in 1..;
-        /// The method that the paper found best.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        paper_best: Option<String>;
+        /// Numbers of trials whose best has a row; by default all from 1 to `best_of`.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        counts: Vec<usize>, in 1..;
     }
 }
 
-/// One point, as written to `trials.csv`.
+/// The best of so many trials, as written to `trials.csv`.
 #[derive(Serialize)]
 pub(super) struct Point<'a> {
     scene: &'a str,
+    scene_kind: &'a str,
     method: &'a str,
     trials: usize,
     /// Best of the first `trials` trials of the first repetition.
     single_run_over_base: f64,
+    /// Median over all blocks of `trials` successive trials, of all repetitions, of their best.
+    median_over_base: f64,
+    /// Lower end of the interval that has the best of as many new trials in at least nine of ten
+    /// repetitions, predicted from the order statistics of all trials, or from an exponential tail
+    /// below the lowest.
+    low_over_base: Option<f64>,
+    /// Upper end of this interval.
+    high_over_base: Option<f64>,
     /// Expected best of `trials` trials: the mean of the exact expectations over repetitions.
     expected_over_base: f64,
     /// Lower end of the 95 % interval of that mean over repetitions; empty if there is only one.
@@ -36,70 +46,45 @@ pub(super) struct Point<'a> {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::default();
         let mut points = Vec::new();
         for scene in rows.scenes() {
-            let curves: Vec<Vec<Point>> =
-                self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
-            output.paper.extend(self.compare(&rows.shown(scene), &curves));
-            points.extend(curves.into_iter().flatten());
+            points.extend(self.methods.iter().flat_map(|method| self.curve(rows, scene, method)));
         }
+        let mut output = Output::default();
         output.add_csv("trials", &points)?;
         Ok(output)
     }
 
-    fn curve<'a>(&self, rows: &Rows, scene: &'a str, method: &'a str) -> Vec<Point<'a>> {
+    fn curve<'a>(&self, rows: &'a Rows, scene: &'a str, method: &'a str) -> Vec<Point<'a>> {
         let repetitions = rows.trials_over_base(scene, method);
         let Some(first) = repetitions.first() else { return Vec::new() };
+        let pool = repetitions.concat();
         let point = |trials: usize| {
-            let single_run_over_base = minimum(first.iter().copied().take(trials))?;
+            let blocks = repetitions.iter().flat_map(|costs| costs.chunks_exact(trials));
+            let best = |costs: &[f64]| minimum(costs.iter().copied());
+            let bests: Vec<f64> = blocks.filter_map(best).collect();
+            let (low_over_base, high_over_base) = predicted_best(&pool, trials).unzip();
             let every: Vec<f64> =
                 repetitions.iter().filter_map(|costs| expected_best_of(costs, trials)).collect();
             let (expected_over_base, interval) = mean_interval(&every)?;
             let (expected_low, expected_high) = interval.unzip();
             Some(Point {
                 scene,
+                scene_kind: rows.kind(scene),
                 method,
                 trials,
-                single_run_over_base,
+                single_run_over_base: *bests.first()?,
+                median_over_base: median(&bests)?,
+                low_over_base,
+                high_over_base,
                 expected_over_base,
                 expected_low,
                 expected_high,
             })
         };
-        (1..=self.best_of.min(first.len())).map_while(point).collect()
-    }
-
-    /// Returns the methods that no other method is below at `best_of` trials, the lowest first.
-    fn best<'p, 'a>(&self, curves: &'p [Vec<Point<'a>>]) -> Vec<&'p Point<'a>> {
-        let mut ranking: Vec<&Point> = curves.iter().filter_map(|curve| curve.last()).collect();
-        ranking.sort_by(|a, b| a.expected_over_base.total_cmp(&b.expected_over_base));
-        let end = |end: Option<f64>, point: &Point| end.unwrap_or(point.expected_over_base);
-        let high = ranking.first().map(|least| end(least.expected_high, least));
-        ranking.retain(|point| high.is_none_or(|high| high >= end(point.expected_low, point)));
-        ranking
-    }
-
-    /// Compares the best methods with the paper's. Where there are several, it is inconclusive
-    /// which is best.
-    fn compare(&self, scene: &str, curves: &[Vec<Point>]) -> Option<PaperRow> {
-        let best = self.best(curves);
-        let (least, paper) = (best.first()?, self.paper_best.as_ref()?);
-        let verdict = match (best.iter().any(|point| point.method == paper), best.len()) {
-            (true, 1) => Verdict::Agrees,
-            (true, _) => Verdict::Inconclusive,
-            (false, _) => Verdict::Differs,
-        };
-        let quantity = format!("best of the compared, by the expected best of {}", self.best_of);
-        let rule = "its 95 % interval lies below those of all others; it differs if that of another lies below its own";
-        let names: Vec<&str> = best.iter().map(|point| point.method).collect();
-        let row = PaperRow::new(scene, quantity);
-        Some(PaperRow {
-            ours_over_base: Some(least.expected_over_base),
-            ours_low: least.expected_low,
-            ours_high: least.expected_high,
-            ..row.compare(paper, names.join(" or "), verdict, rule)
-        })
+        let all: Vec<usize> = (1..=self.best_of).collect();
+        let counts = if self.counts.is_empty() { &all } else { &self.counts };
+        counts.iter().filter(|count| **count <= first.len()).filter_map(|c| point(*c)).collect()
     }
 }
 
@@ -109,44 +94,25 @@ mod tests {
     use crate::report::data::run;
     use crate::rows::TrialRow;
 
-    /// Rows of two methods, each with the costs of its trials by repetition.
-    fn rows(methods: [(&str, [[f64; 3]; 4]); 2]) -> Rows {
-        let mut rows = Rows::default();
-        for (method, repetitions) in methods {
-            for (repetition, costs) in (0..).zip(repetitions) {
-                rows.runs.push(run(method, repetition, 3, 0));
-                rows.trials.extend(costs.map(|cost| TrialRow {
-                    scene: "s".into(),
-                    method: method.into(),
-                    repetition,
-                    evaluations: 0,
-                    cost,
-                }));
-            }
-        }
-        rows
-    }
-
-    fn verdict(paper_best: &str, other: [[f64; 3]; 4]) -> (String, Verdict) {
-        let one = [[1.0, 1.1, 1.2], [1.01, 1.1, 1.2], [0.99, 1.1, 1.2], [1.0, 1.1, 1.2]];
-        let config = Config {
-            methods: vec!["one".into(), "other".into()],
-            best_of: 2,
-            paper_best: Some(paper_best.into()),
-            ..Config::default()
-        };
-        let output = config.write(&rows([("one", one), ("other", other)])).unwrap();
-        (output.paper[0].ours.clone(), output.paper[0].verdict)
-    }
-
     #[test]
-    fn a_method_is_best_only_if_repetitions_tell_it_from_the_others() {
-        let worse = [[1.3, 1.4, 1.5], [1.31, 1.4, 1.5], [1.29, 1.4, 1.5], [1.3, 1.4, 1.5]];
-        assert_eq!(verdict("one", worse), ("one".into(), Verdict::Agrees));
-        assert_eq!(verdict("other", worse), ("one".into(), Verdict::Differs));
-        // Less on average by one lucky repetition.
-        let lucky = [[0.8, 1.1, 1.2], [1.02, 1.1, 1.2], [1.01, 1.1, 1.2], [1.02, 1.1, 1.2]];
-        assert_eq!(verdict("one", lucky), ("other or one".into(), Verdict::Inconclusive));
-        assert_eq!(verdict("other", lucky), ("other or one".into(), Verdict::Inconclusive));
+    fn the_best_of_some_trials_is_the_median_of_all_blocks_and_of_the_first_run() {
+        let mut rows = Rows::default();
+        for (repetition, costs) in (0..).zip([[5.0, 4.0, 3.0, 6.0, 1.0], [2.0, 9.0, 8.0, 8.0, 0.5]])
+        {
+            rows.runs.push(run("m", repetition));
+            rows.trials.extend(costs.map(|cost| TrialRow {
+                scene: "s".into(),
+                method: "m".into(),
+                repetition,
+                evaluations: 0,
+                cost,
+            }));
+        }
+        let config = Config { methods: vec!["m".into()], counts: vec![2, 6], ..Config::default() };
+        let table = config.write(&rows).unwrap().table().unwrap();
+        let [row] = &table[..] else { panic!("a row where there are enough trials: {table:?}") };
+        // The blocks have 4, 3, 2 and 8.
+        let found = ["trials", "single_run_over_base", "median_over_base"].map(|name| &row[name]);
+        assert_eq!(found, ["2", "4.0", "3.5"]);
     }
 }

@@ -124,7 +124,6 @@ rows! {
     }
 
     /// One row of `rays.csv`: the tests that random rays took in a run's tree.
-    #[derive(Default)]
     RayRow in "rays.csv" {
         scene: String,
         method: String,

@@ -93,7 +93,6 @@ impl Store {
         Ok(store)
     }
 
-    /// Removes `.partial/`, if there is one.
     fn discard_runs(&self) -> Result<(), Error> {
         if !self.partial.is_dir() {
             return Ok(());
@@ -112,7 +111,6 @@ impl Store {
         &self.folder
     }
 
-    /// Returns the file that run `index` has once it is kept.
     fn run_file(&self, index: usize) -> PathBuf {
         self.partial.join(run_file_name(index))
     }
@@ -215,7 +213,6 @@ pub fn spec_of_part(folder: &Path) -> PathBuf {
     folder.join(".partial").join(SPEC)
 }
 
-/// Returns the name of the file of the kept run `index`.
 fn run_file_name(index: usize) -> String {
     format!("{index:06}{RUN}")
 }

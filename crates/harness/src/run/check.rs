@@ -1,9 +1,9 @@
 //! Compares fresh results with committed ones: the resolved spec line by line, and CSV files row by
 //! row. Files with times and figures are not compared; `--redraw` makes figures again.
 
-use crate::Error;
 use crate::files::{self, read_toml, to_toml};
-use csv::StringRecord;
+use crate::report::query::Row;
+use crate::{Error, rows};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use toml::{Table, Value};
@@ -30,7 +30,8 @@ pub fn compare(
     for name in names {
         match (now.get(name), then.get(name)) {
             (Some(now), Some(then)) => {
-                differences.extend(shortened(name, now.differences(then, skipped_scenes)));
+                let found = row_differences(now, then, skipped_scenes);
+                differences.extend(shortened(name, found));
             }
             (Some(_), None) => {
                 differences.push(format!("{name} is not among the committed results"));
@@ -41,7 +42,6 @@ pub fn compare(
     Ok(differences)
 }
 
-/// Returns the text of a resolved spec without the skipped scenes.
 fn spec(folder: &Path, skipped_scenes: &[String]) -> Result<String, Error> {
     let mut spec: Table = read_toml(&folder.join("resolved.toml"))?;
     if let Some(Value::Array(scenes)) = spec.get_mut("scenes") {
@@ -51,7 +51,6 @@ fn spec(folder: &Path, skipped_scenes: &[String]) -> Result<String, Error> {
     to_toml(&spec)
 }
 
-/// Compares resolved specs line by line.
 fn spec_differences(fresh: &str, committed: &str) -> Vec<String> {
     let [now, then] = [fresh, committed].map(|text| text.lines().collect::<BTreeSet<_>>());
     let added = now.difference(&then).map(|line| format!("not committed: {line}"));
@@ -74,66 +73,53 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
     differences.into_iter().map(|difference| format!("{file}: {difference}")).collect()
 }
 
-/// The rows of a CSV file, which may differ in length: that is a difference and no error.
-struct Rows {
-    header: StringRecord,
-    records: Vec<StringRecord>,
-}
-
 /// Reads the tables in a folder that hold no seconds, by their names, without the skipped scenes.
-fn tables(folder: &Path, skipped_scenes: &[String]) -> Result<BTreeMap<String, Rows>, Error> {
+fn tables(folder: &Path, skipped_scenes: &[String]) -> Result<BTreeMap<String, Vec<Row>>, Error> {
     let mut tables = BTreeMap::new();
     for name in files::names(folder)? {
         if !name.ends_with(".csv") || name.starts_with("timing") {
             continue;
         }
-        let path = folder.join(&name);
-        let bytes = bvh_scenes::files::read(&path)?;
-        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..]);
-        let header = reader.headers().map_err(Error::csv(&path))?.clone();
-        let records = reader.records().collect::<Result<Vec<StringRecord>, _>>();
-        let mut records = records.map_err(Error::csv(&path))?;
-        if let Some(scene) = header.iter().position(|column| column == "scene") {
-            let is_skipped = |name: &str| skipped_scenes.iter().any(|skipped| skipped == name);
-            records.retain(|record| !record.get(scene).is_some_and(is_skipped));
-        }
-        tables.insert(name, Rows { header, records });
+        let mut rows: Vec<Row> = rows::read(&folder.join(&name))?;
+        rows.retain(|row| row.get("scene").is_none_or(|scene| !skipped_scenes.contains(scene)));
+        tables.insert(name, rows);
     }
     Ok(tables)
 }
 
-impl Rows {
-    fn differences(&self, committed: &Self, skipped_scenes: &[String]) -> Vec<String> {
-        let Self { header, records } = self;
+/// Compares the rows of a file cell by cell.
+fn row_differences(fresh: &[Row], committed: &[Row], skipped_scenes: &[String]) -> Vec<String> {
+    let mut differences = Vec::new();
+    if let Some((now, then)) = fresh.first().zip(committed.first()) {
         // Rows that name no scene are about all scenes, and some are missing here.
-        if !skipped_scenes.is_empty() && !header.iter().any(|column| column == "scene") {
-            return vec![];
+        if !skipped_scenes.is_empty() && !now.contains_key("scene") {
+            return differences;
         }
         // Cells under different columns cannot be compared one by one.
-        if *header != committed.header {
-            return vec![format!("columns are {header:?}, committed {:?}", committed.header)];
+        if !now.keys().eq(then.keys()) {
+            let [now, then] = [now, then].map(|row| row.keys().collect::<Vec<_>>());
+            return vec![format!("columns are {now:?}, committed {then:?}")];
         }
-        let mut differences = Vec::new();
-        for (now, then) in records.iter().zip(&committed.records) {
-            for (column, (now, then_is)) in header.iter().zip(now.iter().zip(then)) {
-                if now != then_is {
-                    let row = identity(header, then);
-                    differences.push(format!("{row}: {column} is {now}, committed {then_is}"));
-                }
+    }
+    for (now, then) in fresh.iter().zip(committed) {
+        for ((column, now), then_is) in now.iter().zip(then.values()) {
+            if now != then_is {
+                let row = identity(then);
+                differences.push(format!("{row}: {column} is {now}, committed {then_is}"));
             }
         }
-        let (now, then) = (records.len(), committed.records.len());
-        if now != then {
-            differences.push(format!("{now} rows, committed {then}"));
-        }
-        differences
     }
+    let (now, then) = (fresh.len(), committed.len());
+    if now != then {
+        differences.push(format!("{now} rows, committed {then}"));
+    }
+    differences
 }
 
 /// Returns the columns that identify a row: its scene, method and so on.
-fn identity(header: &StringRecord, row: &StringRecord) -> String {
-    let keys = ["scene", "method", "column", "quantity", "repetition", "trials", "evaluations"];
-    let values = header.iter().zip(row).filter(|(column, _)| keys.contains(column));
+fn identity(row: &Row) -> String {
+    let keys = ["scene", "method", "quantity", "repetition", "trials", "evaluations"];
+    let values = row.iter().filter(|(column, _)| keys.contains(&column.as_str()));
     values.map(|(column, value)| format!("{column} {value}")).collect::<Vec<_>>().join(", ")
 }
 
@@ -142,7 +128,6 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// Compares folders that differ in the text of one file.
     fn differences(file: &str, texts: [&str; 2], skipped: &[&str]) -> Vec<String> {
         let folders = texts.map(|text| {
             let folder = tempfile::tempdir().unwrap();

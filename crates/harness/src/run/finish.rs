@@ -69,7 +69,6 @@ fn report(
     report::write_all(&made, store, !resolved.experiment.quick)
 }
 
-/// Makes tables and figures from the CSV files in an experiment's folder. Writes nothing.
 fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Error> {
     match &experiment.suite {
         Some(_) => Ok(vec![stress::output(folder)?]),

@@ -104,8 +104,7 @@ impl Finished<'_> {
     }
 
     fn trials(&self) -> Vec<TrialRow> {
-        let label = self.job.labelled.label.as_str();
-        if !self.jobs.experiment.trial_methods().contains(label) {
+        if !self.jobs.experiment.trial_methods().contains(&self.job.labelled.label) {
             return vec![];
         }
         let row = |event: &Event| {

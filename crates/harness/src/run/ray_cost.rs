@@ -79,7 +79,6 @@ pub(crate) fn measure(config: &Config, jobs: &Jobs, store: &Store) -> Result<(),
     Ok(())
 }
 
-/// Averages the tests of a method over its repetitions.
 fn test_row(job: &Job, rays: &TestRays, tests: &[[f64; 2]]) -> TestRow {
     let labelled = job.labelled;
     let options = &labelled.options;
@@ -113,7 +112,6 @@ fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Err
     layout.map_err(|error| tracing_error(job.scene)(error.to_string()))
 }
 
-/// Averages the sizes and costs of a method's trees and layouts over repetitions.
 fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
     let job = runs[0].0;
     let objects = job.scene.boxes.len() as f64;

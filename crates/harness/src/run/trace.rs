@@ -37,7 +37,7 @@ pub(crate) fn measure(
             seed: jobs.experiment.seed_of(&job.scene.name, "tracing", 0),
         });
     }
-    let traced = others.tracing.trace(keys, &runs, &|| jobs.watch.cancelled())?;
+    let traced = (others.tracing.trace)(keys, &runs, &|| jobs.watch.cancelled())?;
     let (files, text) = traced.ok_or_else(|| jobs.interrupted())?;
     for (name, bytes) in files {
         store.write(name, &bytes)?;

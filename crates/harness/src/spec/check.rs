@@ -44,7 +44,6 @@ impl Experiment {
         Ok(())
     }
 
-    /// Checks the scenes' names; loading finds out whether the scenes exist.
     fn check_scenes(&self) -> Result<(), OutOfRange> {
         let rejected = |name: &str, accepted: &str| {
             Err(OutOfRange::new("scenes", format!("{name:?}"), accepted))
@@ -156,7 +155,6 @@ impl Experiment {
         Err(OutOfRange::new("budget", found, accepted))
     }
 
-    /// Rejects a label of two methods.
     fn check_labels(&self) -> Result<(), OutOfRange> {
         let mut known = HashSet::new();
         for (index, Labelled { label, .. }) in self.methods.iter().enumerate() {

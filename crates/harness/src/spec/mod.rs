@@ -112,7 +112,7 @@ impl Experiment {
     }
 
     /// The labels of the methods of which a report reads the costs of all trials.
-    pub fn trial_methods(&self) -> BTreeSet<&str> {
+    pub fn trial_methods(&self) -> BTreeSet<String> {
         self.reports.iter().flat_map(Report::trial_methods).collect()
     }
 

@@ -117,7 +117,7 @@ impl Experiment {
             experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
         }
         if let Some(keys) = experiment.tracing.take() {
-            let resolved = peers::others("tracing")?.tracing.resolve(keys);
+            let resolved = (peers::others("tracing")?.tracing.resolve)(keys);
             experiment.tracing = Some(resolved.map_err(|fault| fault.below("tracing"))?);
         }
         experiment.check_together()?;

@@ -40,7 +40,7 @@ const WRONG: &[(&str, &str, &str)] = &[
     ("grasp', noise = 0.1", "bvh'", "methods[0].method is \"bvh\", another library"),
     (
         "",
-        "[[reports]]\nkind = 'numbers'\nmethods = ['grasp', 'a']",
+        "[[reports]]\nkind = 'anytime'\nmethods = ['grasp', 'a']",
         "line 6: reports[0].methods[1] is \"a\", no label of a method; accepted: grasp",
     ),
     (

@@ -9,7 +9,7 @@ pub fn sorted(values: &[f64]) -> Vec<f64> {
     sorted
 }
 
-/// Returns the `q`-quantile of finite values, 0 ≤ q ≤ 1, interpolated linearly between order
+/// Returns the `q`-quantile of values that are not NaN, 0 ≤ q ≤ 1, interpolated linearly between order
 /// statistics; `None` if there are no values.
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     let sorted = sorted(values);
@@ -18,14 +18,6 @@ pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     let above = sorted[position.ceil() as usize];
     // The difference of two infinite values is NaN.
     Some(if below == above { below } else { below + (above - below) * position.fract() })
-}
-
-/// Returns the least value that at least the fraction `q` of all values do not exceed, 0 < q ≤ 1;
-/// `None` if there are no values. Values may be infinite, like the times of runs that never end.
-pub fn order_quantile(values: &[f64], q: f64) -> Option<f64> {
-    let sorted = sorted(values);
-    let rank = (q * sorted.len() as f64).ceil() as usize;
-    sorted.get(rank.saturating_sub(1)).copied()
 }
 
 /// Returns the median of finite values; `None` if there are no values.
@@ -208,6 +200,12 @@ mod tests {
         let values = [4.0, 1.0, 3.0, 2.0];
         assert_eq!([0.0, 0.5, 1.0].map(|q| quantile(&values, q).unwrap()), [1.0, 2.5, 4.0]);
         assert_eq!(median(&[]), None);
+        // Like the times of runs that never end.
+        assert_eq!(
+            [0.0, 0.5].map(|q| quantile(&[f64::INFINITY, 1.0], q)),
+            [Some(1.0), Some(f64::INFINITY)]
+        );
+        assert_eq!(median(&[f64::INFINITY; 3]), Some(f64::INFINITY));
     }
 
     #[test]
@@ -249,17 +247,6 @@ mod tests {
         assert!(mean == 3.0 && (low - 1.037).abs() < 1e-3 && (high - 4.963).abs() < 1e-3);
         let (_, interval) = mean_interval(&[7.0; 40]).unwrap();
         assert_eq!(interval, Some((7.0, 7.0)));
-    }
-
-    #[test]
-    fn order_quantiles_are_values_even_beside_infinite_ones() {
-        let times = [3.0, f64::INFINITY, 1.0, 2.0];
-        assert_eq!(
-            [0.25, 0.5, 0.75, 0.9].map(|q| order_quantile(&times, q).unwrap()),
-            [1.0, 2.0, 3.0, f64::INFINITY]
-        );
-        assert_eq!(order_quantile(&[], 0.5), None);
-        assert_eq!(median(&[f64::INFINITY; 3]), Some(f64::INFINITY));
     }
 
     #[test]

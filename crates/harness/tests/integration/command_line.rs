@@ -77,6 +77,7 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
         &["of 240 runs are kept, `--resume` does the rest"],
     );
     assert!(folder.path().join("results/spec/.partial/000000.run").is_file());
+    refused(folder.path(), &["spec.toml"], 2, &["finished runs", "--resume", "--force"]);
     said(folder.path(), &["spec.toml", "--resume"]);
     // A repetition of finished results is in a temporary folder, which goes.
     let results = folder.path().join("results/spec");
@@ -177,9 +178,13 @@ methods = [
     { label = 'search', method = 'reinsertion', budget = { max_work = 2000 } },
 ]
 [[reports]]
-kind = 'numbers'
-title = 'gaps'
-methods = ['greedy', 'search']
+kind = 'query'
+file = 'gaps'
+rows = 'runs.csv'
+join = 'references.csv'
+join_by = ['scene']
+by = ['method']
+columns = [{ name = 'gap', value = 'median cost / references.cost - 1' }]
 ";
 
 #[test]
@@ -209,8 +214,8 @@ fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
 }
 
 fn gap(folder: &Path) -> f64 {
-    let rows = rows(&folder.join("results/short/numbers.csv"));
-    rows.iter().find(|row| row["method"] == "search").unwrap()["gap_median"].parse().unwrap()
+    let rows = rows(&folder.join("results/short/gaps.csv"));
+    rows.iter().find(|row| row["method"] == "search").unwrap()["gap"].parse().unwrap()
 }
 
 #[test]

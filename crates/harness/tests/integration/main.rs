@@ -9,7 +9,6 @@ mod external;
 mod faults;
 mod merge;
 mod paper;
-mod pictures;
 mod protection;
 mod release;
 #[path = "../support/mod.rs"]

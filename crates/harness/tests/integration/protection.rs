@@ -92,18 +92,6 @@ fn kept_runs(results: &Path) -> Vec<String> {
 }
 
 #[test]
-fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() {
-    let folder = folder("spec.toml");
-    let dir = folder.path();
-    part(dir, "spec.toml", 0, 2, &[]);
-    refused(dir, &["spec.toml"], &["finished runs", "--resume", "--force"]);
-    assert!(!kept_runs(&dir.join("results/spec")).is_empty());
-    said(dir, &["spec.toml", "--resume"]);
-    said(dir, &["spec.toml", "--out=whole"]);
-    assert!(reproducible(&dir.join("results/spec")) == reproducible(&dir.join("whole/spec")));
-}
-
-#[test]
 fn a_damaged_finished_run_or_one_with_another_name_is_named_and_repeated_or_rejected() {
     let folder = folder("spec.toml");
     let dir = folder.path();

@@ -26,22 +26,24 @@ methods = [
 ]
 
 [[reports]]
-kind = 'table'
+kind = 'trials'
+methods = ['noise']
+best_of = 5
+counts = [5]
+
+[[reports]]
+kind = 'query'
 source = 'Test'
 title = 'a table'
+file = 'table'
+rows = 'trials.csv'
+by = ['scene', 'trials']
+columns = [
+    { name = 'cost', value = 'only median_over_base', paper = [{ row = 'scene=pinecon2:300', value = 0.9 }] },
+]
 [reports.figure]
-x = 'cost_over_base'
+x = 'cost'
 y = 'scene'
-series = ['column']
-[[reports.columns]]
-name = 'base'
-method = 'greedy'
-paper = { 'escher:300' = 1.0, 'pinecon2:300' = 1.0 }
-[[reports.columns]]
-name = 'best of 5'
-method = 'noise'
-best_of = 5
-paper = { 'escher:300' = 1.0, 'pinecon2:300' = 0.9 }
 
 [quick]
 scenes = ['escher:300']
