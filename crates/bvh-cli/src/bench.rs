@@ -81,7 +81,7 @@ pub fn bench(args: &BenchArgs, answer: &mut Answer) -> Result<(), Error> {
 /// A tree and its triangles in the wide layout.
 pub enum Layout {
     Single(WideBvh),
-    Double(DWideBvh),
+    Double(Box<DWideBvh>),
 }
 
 impl Layout {
@@ -89,7 +89,8 @@ impl Layout {
     fn new(scene: &Scene, tree: &Bvh, visits: Option<&[f32]>) -> Result<Self, Error> {
         let invalid = |error| SceneError::new(&scene.name, error);
         if let Primitives::Doubles(triangles) = &scene.primitives {
-            return Ok(Self::Double(DWideBvh::new(tree, triangles).map_err(invalid)?));
+            let wide = DWideBvh::new(tree, triangles).map_err(invalid)?;
+            return Ok(Self::Double(Box::new(wide)));
         }
         let triangles = scene.triangles()?;
         let wide = match visits {

@@ -69,8 +69,8 @@ pub struct View<'a, P> {
 pub fn neighbours<P: Copy + Into<DVec3>>(points: &[P]) -> Vec<u32> {
     let at = |point: &P| (*point).into();
     let low = points.iter().map(at).fold(DVec3::INFINITY, DVec3::min);
-    // The bits of numbers from 0 on are in the order of the numbers.
-    let bits = |point: &P| (at(point) - low).as_vec3().to_array().map(f32::to_bits);
+    // The bits of numbers from +0 on are in the order of the numbers.
+    let bits = |point: &P| (at(point) - low + DVec3::ZERO).as_vec3().to_array().map(f32::to_bits);
     let mut points: Vec<([u32; 3], u32)> = points.iter().map(bits).zip(0..).collect();
     // Pairs of a beginning and an end.
     let mut open = vec![(0, points.len())];

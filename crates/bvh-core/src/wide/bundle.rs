@@ -152,7 +152,11 @@ impl<'a, O: Obstacles> Bundle<'a, O> {
                 let mut entering = Entering(0);
                 let mut rows = MaybeUninit::<S::Rows>::uninit();
                 if !is_open {
-                    (entering, inner) = self.enter_children(shape, &outline, vectors);
+                    let any;
+                    (entering, any) = self.enter_children(shape, &outline, vectors);
+                    // Rounding may let one vector into a box that all together do not enter, which
+                    // has no key.
+                    inner &= any;
                     shape.write(&outline, rows.as_mut_ptr());
                     let mut leaves = inner & is_leaf;
                     inner &= !is_leaf;

@@ -331,7 +331,8 @@ impl<K: Instructions, O: Obstacles> Pencil<'_, K, O> {
                     let size = self.scale / self.fan.sizes[vector][lane];
                     let end = (t * size).min(16.0);
                     let slack = end * f64::from(pow2(-20)) + f64::from(f32::from_bits(1)) * size;
-                    lanes.0[0][lane] = (end - slack) as f32;
+                    // Both factors of a comparison with it may not be negative.
+                    lanes.0[0][lane] = (end - slack).max(0.0) as f32;
                     lanes.0[1][lane] = (end + slack) as f32;
                 }
                 *ends = [K::Rays::load(lanes.0[0].as_ptr()), K::Rays::load(lanes.0[1].as_ptr())];

@@ -360,3 +360,31 @@ fn invalid_skies_are_rejected_with_their_fault() {
     let rejected = sky.with_weights(vec![1.0, f64::NAN]);
     assert!(matches!(rejected, Err(InvalidSky::Weight(1, _))));
 }
+
+/// Long directions make every distance tiny, so that rounding decides whether a hit is in the range.
+#[test]
+fn long_directions_hit_just_in_front_of_a_point_and_within_a_tiny_range() {
+    let grows = |k: i32| (f64::from(k)).exp2();
+    for (size, length, end) in
+        [(grows(-110), grows(30), grows(-137)), (grows(-25), grows(100), grows(-100))]
+    {
+        let corners = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]]
+            .map(|corner| DVec3::from(corner) * size);
+        let triangle = Triangle(corners.map(DVec3::as_vec3));
+        let bvh = tree(&bvh_core::boxes(&[triangle]), SHAPES[0], &mut Random(1));
+        for height in (20..60).map(|k| grows(-k)) {
+            let point = DVec3::Z * height * size;
+            let along = DVec3::new(1.0, 0.0, -2.0 * height) * length;
+            let sky = Sky::new(vec![along; 100], [0.0, end]).unwrap();
+            for kernel in Kernel::ALL {
+                let wide = WideBvh::new(&bvh, &[triangle]).unwrap();
+                let Some(wide) = wide.with_kernel(kernel) else { continue };
+                let hits = |_, direction: DVec3| {
+                    let ray = Ray::new(point.as_vec3(), direction.as_vec3(), 0.0, end as f32);
+                    wide.any_hit(&ray.unwrap())
+                };
+                compared(&wide, &sky, &[point.as_vec3()], hits);
+            }
+        }
+    }
+}
