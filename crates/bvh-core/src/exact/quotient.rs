@@ -123,8 +123,8 @@ fn dot<D: Numbers>(a: [D; 3], b: [D; 3]) -> D {
 
 /// Returns two bounds of the distance A · n / d · n of the plane with the normal n = p × q: the corner
 /// A and the sides p, q, exactly, and the direction d, which is not parallel to the plane. If they
-/// are equal, that is the distance, rounded once. `nearly` is a number close to it, if one is known
-/// already.
+/// are equal, that is the distance, rounded once. `nearly` is a number close to it, 0 or a
+/// normal one, if one is known already: of a subnormal one the bounds would lose their slack.
 #[inline(always)]
 pub(crate) fn distance<D: Numbers>(
     [ax, ay, az]: [Twice<D>; 3],

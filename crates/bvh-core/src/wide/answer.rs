@@ -47,7 +47,8 @@ pub(crate) trait Find {
     /// Returns the new nearest hit of a ray, if one of the triangles of a block is it.
     ///
     /// # Safety
-    /// The processor has the instructions; the block is one of the layout.
+    /// The processor has the instructions; the block is one of the layout, with a triangle in each
+    /// lane that is bounded.
     unsafe fn decide<K: Instructions>(
         &mut self,
         _number: usize,

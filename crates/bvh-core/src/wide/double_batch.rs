@@ -208,16 +208,6 @@ impl Rays for DRays<'_> {
         self.rays.len()
     }
 
-    #[inline(always)]
-    unsafe fn load<L: Lanes>(
-        self,
-        first: usize,
-        frame: Option<&Frame>,
-    ) -> (RayLanes<L>, BoxLanes<L>) {
-        // SAFETY: the rays exist.
-        unsafe { self.load_up_to(first, first + L::N, frame) }
-    }
-
     /// Returns what [`DWideBvh::boxed`] returns for every ray, but for operations that are fused.
     #[inline(always)]
     unsafe fn load_up_to<L: Lanes>(

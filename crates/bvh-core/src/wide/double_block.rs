@@ -22,8 +22,8 @@ pub(super) struct Decided {
 /// of them in other lanes.
 ///
 /// # Safety
-/// The processor has the instructions of `L`, which has four lanes; the triangles are those of the
-/// block.
+/// The processor has the instructions of `L`, which has four lanes; there is a triangle in each of
+/// these `lanes`, and the triangles are those of the block.
 #[inline(always)]
 pub(super) unsafe fn corners_of<L: Lanes>(
     block: &TriangleBlock,

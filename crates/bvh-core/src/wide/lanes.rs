@@ -229,7 +229,8 @@ pub(crate) trait DoubleLanes:
     /// both.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
 
-    /// The rounded products and their rounding errors, where products are fused.
+    /// The rounded products and their rounding errors. Where [`mul_sub`](Self::mul_sub) rounds twice,
+    /// they are found otherwise.
     #[inline(always)]
     fn two_product(self, other: Self) -> (Self, Self) {
         let product = self * other;

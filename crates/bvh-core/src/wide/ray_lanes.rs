@@ -43,7 +43,7 @@ pub(crate) trait Rays: Copy {
     /// Does the same; the last ray before `end` fills the lanes that have none.
     ///
     /// # Safety
-    /// The processor has the instructions, and there is a ray.
+    /// The processor has the instructions, and the rays from `first` to before `end` are some.
     unsafe fn load_up_to<L: Lanes>(
         self,
         first: usize,
