@@ -74,7 +74,7 @@ pub fn refuses(method: &Method, damage: fn(&mut Aabb)) -> Verdict {
         Err(error) => bail!("P1: not rejected as a scene: {error}"),
         Ok(_) => bail!("P1: built a tree over object {DAMAGED}"),
     };
-    let is_named = error.contains(&format!("object {DAMAGED} "));
+    let is_named = error.contains(&format!("object {DAMAGED}, ["));
     ensure!(is_named, "P1: the error names no object {DAMAGED}: {error}");
     Ok(error)
 }
