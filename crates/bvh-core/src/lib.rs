@@ -40,7 +40,7 @@ pub use packed::PackedAabb;
 pub use primitives::{Primitive, Primitives, boxes};
 pub use ray::{Hit, InvalidRay, Ray};
 pub use ray_density::{DensityError, RayDensity, Segment};
-pub use sky::{InvalidSky, Sky, View, neighbours};
+pub use sky::{InvalidSky, Sky, View};
 pub use slabs::{Slabs, clip_to_box};
 pub use solid::{InsideRule, Solid, Traced};
 pub use sphere::Sphere;
@@ -54,7 +54,7 @@ pub use validate::{InvalidBvh, validate, validate_references};
 pub use wide::NodeTest;
 pub use wide::{
     Closest, Coherence, DWideBvh, Instance, InstanceHit, Instances, InvalidInstances, Kernel,
-    RefitError, WideBvh,
+    RefitError, WideBvh, neighbours,
 };
 
 pub use glam;

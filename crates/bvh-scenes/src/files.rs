@@ -24,6 +24,10 @@ impl ReadError {
     pub fn of(path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |error| match error.kind() {
             kind @ io::ErrorKind::NotFound => {
+                if let Ok(end) = fs::read_link(path) {
+                    let message = format!("a link to {}, which is not there", end.display());
+                    return Self::new(path, kind, message);
+                }
                 let name = path.file_name().map(|name| name.to_string_lossy());
                 let files = fs::read_dir(folder_of(path)).into_iter().flatten().flatten();
                 let files = files.take(1000).map(|file| file.file_name().into_string());
@@ -240,6 +244,16 @@ mod tests {
             assert_eq!(read(path).unwrap_err().kind(), kind);
             assert!(Reserved::new(path, 1, false).is_err(), "{}", path.display());
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_that_leads_nowhere_is_named_with_its_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("dead.obj");
+        std::os::unix::fs::symlink("nowhere.obj", &path).unwrap();
+        let error = read(&path).unwrap_err().source.to_string();
+        assert!(error.contains("nowhere.obj") && !error.contains("dead.obj"), "{error}");
     }
 
     #[test]

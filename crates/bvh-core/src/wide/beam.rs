@@ -74,13 +74,14 @@ use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{Kernel, SPARE, STACK, deep_stacks};
 use super::lanes::{Aligned, DoubleLanes, Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
+use super::neighbours::neighbours;
 use super::ray_lanes::least as least_of;
 use super::triangles::TriangleBlock;
 use super::vector;
 use crate::double::largest_axis;
 use crate::exact::AXES;
 use crate::ray::pow2;
-use crate::{Aabb, Ray, neighbours};
+use crate::{Aabb, Ray};
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
 

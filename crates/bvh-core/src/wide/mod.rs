@@ -24,6 +24,7 @@ mod instructions;
 mod kernel;
 mod lanes;
 mod layout;
+mod neighbours;
 mod obstacles;
 mod one_ray;
 mod packet;
@@ -56,6 +57,7 @@ pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
 pub(crate) use layout::WideNode;
+pub use neighbours::neighbours;
 pub use refit::RefitError;
 #[doc(hidden)]
 pub use tightness::NodeTest;
