@@ -171,7 +171,8 @@ impl Sky {
     /// is free where the bit `j % 64` of word `j / 64` is set. A direction is free where no triangle
     /// is in the range, exactly as [`any_hit`](crate::WideBvh::any_hit) says.
     ///
-    /// `order` has the numbers of the points; fastest where [`neighbours`](crate::neighbours) follow each other.
+    /// `order` has the numbers of the points; fastest where [`neighbours`](crate::neighbours) follow
+    /// each other.
     /// Memory for 64 points at a time.
     ///
     /// # Panics
