@@ -5,8 +5,8 @@
 //! between 2⁻¹⁵⁰ and 2¹²⁰ in size; smaller ones count as 0. All values of the exact layer are then
 //! multiples of 2⁻⁶⁶⁰ below 2⁵⁰⁰.
 
-pub(crate) use crate::exact::largest_axis;
 use crate::exact::{Line, Verdict, is_degenerate};
+use crate::ray::power_below;
 use crate::triangle::{normal_of, offset_from};
 use crate::{Aabb, Corners, Frame, Hit, Ray, Triangle};
 use bytemuck::{Pod, Zeroable};
@@ -162,8 +162,8 @@ impl DRay {
     /// from distances to those of a ray whose direction has about the length 1, and back.
     #[inline(always)]
     pub(crate) fn scales(&self) -> [f64; 2] {
-        let size = self.direction.abs().max_element().to_bits() & f64::INFINITY.to_bits();
-        [size, 2 * 1.0f64.to_bits() - size].map(f64::from_bits)
+        let size = power_below(self.direction.abs().max_element());
+        [size, f64::from_bits(2 * 1.0f64.to_bits() - size.to_bits())]
     }
 
     /// Returns a distance in f32, for the direction scaled so that its largest component is about 1.

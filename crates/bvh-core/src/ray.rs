@@ -230,6 +230,12 @@ pub(crate) const fn pow2(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
+/// Returns the greatest power of two up to a positive normal number.
+#[inline(always)]
+pub(crate) fn power_below(x: f64) -> f64 {
+    f64::from_bits(x.to_bits() >> 52 << 52)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

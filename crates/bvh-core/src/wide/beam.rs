@@ -61,258 +61,22 @@
 //! never certain, and a miss by its distance is, since the error of S is in the bound.
 //!
 //! Rays that are left open are traced by themselves, against that triangle alone.
-//!
-//! # Far apart
-//!
-//! Where the points of a beam are far apart, many vectors may enter boxes that none of their rays
-//! enter. There every ray is tested against the boxes of inner nodes, too, and farther apart
-//! [fans](super::fan) take less work. The first beams tell both.
 
-use super::bundle::{Bundle, RAYS, Shape, VECTORS};
-use super::fan::{Fan, Pencil};
-use super::instructions::{Instructions, Pending, Task};
-use super::kernel::{Kernel, SPARE, STACK, deep_stacks};
+use super::bundle::{Coefficients, LANES, RAYS, Shape, VECTORS, store_three};
+use super::instructions::Instructions;
 use super::lanes::{Aligned, DoubleLanes, Lanes, Mask};
-use super::layout::{WideBvh, WideNode};
-use super::neighbours::neighbours;
+use super::layout::WideNode;
+use super::obstacles::{Beams, Obstacles};
 use super::ray_lanes::least as least_of;
 use super::triangles::TriangleBlock;
-use super::vector;
-use crate::double::largest_axis;
-use crate::exact::AXES;
-use crate::ray::pow2;
-use crate::{Aabb, Ray};
+use crate::Aabb;
+use crate::exact::{AXES, largest_axis};
+use crate::ray::{pow2, power_below};
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
 
-/// The maximum number of points of a beam.
-pub(crate) const POINTS: usize = RAYS;
-
-/// The maximum number of rays of a vector.
-pub(super) const LANES: usize = 16;
-
-/// The triangles that stop beams, in f32 or f64, laid out.
-pub(crate) trait Obstacles {
-    /// A point.
-    type Point: Copy + Into<DVec3>;
-    /// A ray.
-    type Ray;
-
-    /// The layout of the boxes.
-    fn boxes(&self) -> &WideBvh;
-
-    /// The point in f64.
-    fn point(point: Self::Point) -> DVec3;
-
-    /// Returns a bound of the coordinates of all corners relative to a point.
-    fn reach(&self, point: DVec3) -> f64;
-
-    /// The ray from a point, over the range of beams.
-    fn ray(&self, point: Self::Point, direction: DVec3, range: [f64; 2]) -> Self::Ray;
-
-    /// Returns the ray as boxes are tested with it.
-    fn boxed(&self, ray: &Self::Ray) -> Ray;
-
-    /// Returns the corners of a block's triangles along some axes.
-    unsafe fn corners<L: Lanes>(
-        &self,
-        block: &TriangleBlock,
-        axes: [usize; 3],
-    ) -> [[L::Double; 3]; 3];
-
-    /// Returns whether the triangle in a lane of a block stops a ray.
-    fn stops(&self, ray: &Self::Ray, block: &TriangleBlock, lane: usize) -> bool;
-
-    /// Writes whether anything stops each ray.
-    fn are_stopped(&self, rays: &[Self::Ray], stopped: &mut [bool]);
-}
-
-/// Neighbouring points, and the directions in which they look.
-pub(crate) struct Beams<'a, O: Obstacles> {
-    pub(crate) obstacles: &'a O,
-    /// At most [`POINTS`], at least one.
-    pub(crate) points: &'a [O::Point],
-    /// Only directions above the surface count.
-    pub(crate) normals: Option<&'a [O::Point]>,
-    pub(crate) directions: &'a [DVec3],
-    pub(crate) range: [f64; 2],
-}
-
-impl<O: Obstacles> Beams<'_, O> {
-    /// Passes for each direction its number and a bit for each point from which it is free.
-    pub(crate) fn trace(&self, free: &mut dyn FnMut(usize, u64)) {
-        let numbers = trials_first(self.directions.len());
-        let wide = self.obstacles.boxes();
-        let boxed = |&point: &O::Point| {
-            let ray = self.obstacles.ray(point, DVec3::X, self.range);
-            self.obstacles.boxed(&ray).origin()
-        };
-        let origins: Vec<Vec3> = self.points.iter().map(boxed).collect();
-        let is_near = wide.near_box().contains(&Aabb::around(origins.iter().copied()));
-        if wide.kernel == Kernel::Portable || !is_near {
-            return self.trace_alone(&numbers, free);
-        }
-        let task = Trace { beams: self, origins: &origins, numbers: &numbers, free };
-        // SAFETY: a layout's kernel is available.
-        unsafe { vector::dispatch::<_, ()>(wide.kernel, task) };
-    }
-
-    /// Traces ray by ray in the directions of these numbers.
-    fn trace_alone(&self, numbers: &[u32], free: &mut dyn FnMut(usize, u64)) {
-        /// Directions of one batch of rays, which pays if it is long.
-        const AT_ONCE: usize = 32;
-        let count = self.points.len();
-        for numbers in numbers.chunks(AT_ONCE) {
-            let ray = |&number: &u32| {
-                let direction = self.directions[number as usize];
-                self.points.iter().map(move |&from| self.obstacles.ray(from, direction, self.range))
-            };
-            let rays: Vec<O::Ray> = numbers.iter().flat_map(ray).collect();
-            let mut stopped = vec![false; rays.len()];
-            self.obstacles.are_stopped(&rays, &mut stopped);
-            for (&number, stopped) in numbers.iter().zip(stopped.chunks_exact(count)) {
-                let direction = self.directions[number as usize];
-                let is_free = |&point: &usize| !stopped[point] && self.is_above(point, direction);
-                free(number as usize, (0..count).filter(is_free).map(|point| 1 << point).sum());
-            }
-        }
-    }
-
-    /// Returns whether a direction is above the surface at a point.
-    #[inline(always)]
-    pub(super) fn is_above(&self, point: usize, direction: DVec3) -> bool {
-        // A tiny normal counts, too.
-        self.normals.is_none_or(|normals| normals[point].into().dot(direction) > 0.0)
-    }
-}
-
-/// Returns the numbers of directions, first those of trials, which are spread over all of them.
-fn trials_first(count: usize) -> Vec<u32> {
-    let mut numbers: Vec<u32> = (0..count as u32).collect();
-    numbers.sort_by_key(|&number| number as usize * TRIALS % count >= TRIALS);
-    numbers
-}
-
-/// The number of beams that tell how the others of the same points are traced.
-const TRIALS: usize = 4;
-
-/// The fraction of the children of inner nodes that no ray enters, of those that vectors may enter,
-/// from which on testing every ray pays.
-const LEAST_PRUNED: f32 = 0.3;
-
-/// The work for each ray of a fan, about in cycles, and that of a fan: points whose beams take more
-/// are far apart.
-const WORK_OF_FANS: [usize; 2] = [50, 3500];
-
-/// The tracing of beams by a vector kernel.
-struct Trace<'a, O: Obstacles> {
-    beams: &'a Beams<'a, O>,
-    /// The points as boxes are tested with them.
-    origins: &'a [Vec3],
-    /// The numbers of the directions.
-    numbers: &'a [u32],
-    free: &'a mut dyn FnMut(usize, u64),
-}
-
-impl<K: Instructions, O: Obstacles> Task<K> for Trace<'_, O> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run(self) {
-        let Self { beams, origins, numbers, free } = self;
-        // SAFETY: the processor has the instructions; the stack has room for `stack_need` children
-        // and one register more.
-        unsafe {
-            let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
-            let mut deep = deep_stacks::<Pending>(1, beams.obstacles.boxes().stack_need);
-            let base =
-                deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
-            let group = Group::<K>::new(beams, origins);
-            let mut beam = Beam::new(&group, beams);
-            let mut bundle = Bundle::new(beams.obstacles);
-            let [of_ray, of_fan] = WORK_OF_FANS;
-            let most = (of_ray + of_fan / numbers.len().max(1)) * TRIALS * origins.len();
-            let mut others = numbers;
-            while let [number, rest @ ..] = others {
-                if numbers.len() - others.len() == TRIALS {
-                    if bundle.work > most as u64 {
-                        break;
-                    }
-                    bundle.is_strict = bundle.pruned as f32 > LEAST_PRUNED * bundle.tested as f32;
-                }
-                let direction = beams.directions[*number as usize];
-                beam.aim(direction);
-                let is_above = |&point: &usize| beams.is_above(point, direction);
-                let rays = bits(origins.len(), beams.normals.is_none(), is_above);
-                free(*number as usize, bundle.trace::<K>(&beam, rays, base));
-                others = rest;
-            }
-            bundle.is_strict = true;
-            for octant in octants(beams, others) {
-                for numbers in octant.chunks(RAYS) {
-                    let fan = Fan::<K>::new(beams, numbers);
-                    let mut seen = [0; RAYS];
-                    for (point, &origin) in origins.iter().enumerate() {
-                        let is_above = |&ray: &usize| {
-                            beams.is_above(point, beams.directions[numbers[ray] as usize])
-                        };
-                        let rays = bits(numbers.len(), beams.normals.is_none(), is_above);
-                        let pencil = Pencil::new(&fan, beams, point, origin);
-                        seen[point] = bundle.trace::<K>(&pencil, rays, base);
-                    }
-                    transpose(&mut seen);
-                    for (&number, &points) in numbers.iter().zip(&seen) {
-                        free(number as usize, points);
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Returns a bit for each number below `count`, of which `holds` is true unless it is for all.
-#[inline(always)]
-fn bits(count: usize, for_all: bool, holds: impl Fn(&usize) -> bool) -> u64 {
-    match for_all {
-        true => u64::MAX >> (RAYS - count),
-        false => (0..count).filter(holds).map(|number| 1 << number).sum(),
-    }
-}
-
-/// Returns the numbers of directions by the octants of the boxes that they run in, neighbours next to
-/// each other.
-fn octants<O: Obstacles>(beams: &Beams<'_, O>, numbers: &[u32]) -> [Vec<u32>; 8] {
-    let mut octants: [Vec<u32>; 8] = Default::default();
-    for &number in numbers {
-        let direction = beams.directions[number as usize];
-        let ray = beams.obstacles.ray(beams.points[0], direction, beams.range);
-        let inverse = beams.obstacles.boxed(&ray).inverse_direction();
-        octants[inverse.is_negative_bitmask() as usize].push(number);
-    }
-    octants.map(|numbers| {
-        let unit = |&number: &u32| beams.directions[number as usize].normalize();
-        let units: Vec<DVec3> = numbers.iter().map(unit).collect();
-        neighbours(&units).into_iter().map(|place| numbers[place as usize]).collect()
-    })
-}
-
-/// Turns rows of bits into columns: bit `i` of number `j` into bit `j` of number `i`.
-pub(crate) fn transpose(bits: &mut [u64; RAYS]) {
-    let mut size = RAYS / 2;
-    let mut low = u64::MAX >> size;
-    while size != 0 {
-        for i in (0..RAYS).filter(|i| i & size == 0) {
-            let swapped = (bits[i] >> size ^ bits[i + size]) & low;
-            bits[i] ^= swapped << size;
-            bits[i + size] ^= swapped;
-        }
-        size /= 2;
-        low ^= low << size;
-    }
-}
-
 /// Points side by side: what beams in all directions have in common.
-struct Group<K: Instructions> {
+pub(super) struct Group<K: Instructions> {
     /// The middle, and the power of two by which relative coordinates are scaled.
     centre: DVec3,
     scale: f64,
@@ -334,8 +98,8 @@ struct Group<K: Instructions> {
 
 impl<K: Instructions> Group<K> {
     #[inline(always)]
-    unsafe fn new<O: Obstacles>(beams: &Beams<'_, O>, origins: &[Vec3]) -> Self {
-        const { assert!(POINTS / VECTORS <= K::Rays::N && K::Rays::N <= LANES) };
+    pub(super) unsafe fn new<O: Obstacles>(beams: &Beams<'_, O>, origins: &[Vec3]) -> Self {
+        const { assert!(RAYS / VECTORS <= K::Rays::N && K::Rays::N <= LANES) };
         let points = || beams.points.iter().map(|&point| O::point(point));
         let min = points().fold(DVec3::INFINITY, DVec3::min);
         let max = points().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -403,13 +167,8 @@ impl<K: Instructions> Group<K> {
     }
 }
 
-/// Returns the greatest power of two up to a positive normal number.
-pub(super) fn power_below(x: f64) -> f64 {
-    f64::from_bits(x.to_bits() >> 52 << 52)
-}
-
 /// The rays of a group in one direction.
-struct Beam<'a, K: Instructions, O: Obstacles> {
+pub(super) struct Beam<'a, K: Instructions, O: Obstacles> {
     group: &'a Group<K>,
     beams: &'a Beams<'a, O>,
     direction: DVec3,
@@ -434,7 +193,7 @@ struct Beam<'a, K: Instructions, O: Obstacles> {
 
 impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
     #[inline(always)]
-    unsafe fn new(group: &'a Group<K>, beams: &'a Beams<'a, O>) -> Self {
+    pub(super) unsafe fn new(group: &'a Group<K>, beams: &'a Beams<'a, O>) -> Self {
         // SAFETY: the processor has the instructions.
         unsafe {
             let none = [K::Rays::splat(0.0); 3];
@@ -458,7 +217,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
 
     /// Turns all rays to a direction.
     #[inline(always)]
-    unsafe fn aim(&mut self, direction: DVec3) {
+    pub(super) unsafe fn aim(&mut self, direction: DVec3) {
         let Self { group, beams, .. } = *self;
         let axes = AXES[largest_axis(direction)];
         let [x, y, z] = axes;
@@ -594,7 +353,7 @@ impl<K: Instructions, O: Obstacles> Shape<K, O> for Beam<'_, K, O> {
     #[inline(always)]
     unsafe fn shadows(&self, block: &TriangleBlock) -> Shadows {
         // SAFETY: the processor has the instructions.
-        unsafe { Shadows::new(self, block) }
+        unsafe { Shadows::of_beam(self, block) }
     }
 
     #[inline(always)]
@@ -602,9 +361,9 @@ impl<K: Instructions, O: Obstacles> Shape<K, O> for Beam<'_, K, O> {
         // SAFETY: the processor has the instructions; the lane is one of four.
         unsafe {
             let [x, y, z] = self.points[vector];
-            let u = shadows.value(0, lane, x, y);
-            let v = shadows.value(3, lane, x, y);
-            let w = shadows.value(6, lane, x, y);
+            let u = shadows.value_at(0, lane, x, y);
+            let v = shadows.value_at(3, lane, x, y);
+            let w = shadows.value_at(6, lane, x, y);
             let least = u.min(v).min(w);
             let edge_error = shadows.number(Shadows::EDGE_ERROR, lane);
             let area = shadows.number(Shadows::AREA, lane);
@@ -620,7 +379,7 @@ impl<K: Instructions, O: Obstacles> Shape<K, O> for Beam<'_, K, O> {
                 return (0, 0);
             }
             let z = z ^ z.filled(self.side);
-            let depth = shadows.value(Shadows::DEPTH, lane, x, y) - z * z.filled(area);
+            let depth = shadows.value_at(Shadows::DEPTH, lane, x, y) - z * z.filled(area);
             let slack = shadows.number(Shadows::DEPTH_ERROR, lane);
             let [begin, end] = self.range;
             let within = z.filled(area * begin[1] + slack).lt(depth)
@@ -642,7 +401,7 @@ impl<K: Instructions, O: Obstacles> Shape<K, O> for Beam<'_, K, O> {
 /// The coefficients of four triangles for a beam, lane by lane: three for each edge value, three for
 /// the depth, |S|, and the bounds of the errors. The signs are those for a positive S and a positive
 /// direction.
-pub(super) struct Shadows([[f32; 4]; 15]);
+pub(super) type Shadows = Coefficients<15>;
 
 impl Shadows {
     const DEPTH: usize = 9;
@@ -650,20 +409,12 @@ impl Shadows {
     const EDGE_ERROR: usize = 13;
     const DEPTH_ERROR: usize = 14;
 
-    /// # Safety
-    /// The row is one of fifteen and the lane one of four.
-    #[inline(always)]
-    unsafe fn number(&self, row: usize, lane: usize) -> f32 {
-        // SAFETY: they exist.
-        unsafe { *self.0.get_unchecked(row).get_unchecked(lane) }
-    }
-
     /// Returns what the three coefficients from a row on give for points.
     ///
     /// # Safety
     /// As for [`number`](Self::number).
     #[inline(always)]
-    unsafe fn value<L: Lanes>(&self, row: usize, lane: usize, x: L, y: L) -> L {
+    unsafe fn value_at<L: Lanes>(&self, row: usize, lane: usize, x: L, y: L) -> L {
         // SAFETY: the rows exist.
         unsafe {
             let constant = x.filled(self.number(row + 2, lane));
@@ -673,7 +424,7 @@ impl Shadows {
     }
 
     #[inline(always)]
-    unsafe fn new<K: Instructions, O: Obstacles>(
+    unsafe fn of_beam<K: Instructions, O: Obstacles>(
         beam: &Beam<'_, K, O>,
         block: &TriangleBlock,
     ) -> Self {
@@ -753,19 +504,14 @@ fn edge<D: DoubleLanes>([bx, by, _]: &[D; 3], [cx, cy, _]: &[D; 3]) -> [D; 3] {
 /// their terms together.
 #[inline(always)]
 unsafe fn write<L: Lanes>(
-    [x, y, constant]: [L::Double; 3],
+    coefficients: [L::Double; 3],
     flip: L,
     [hx, hy]: [L; 2],
     to: *mut f32,
 ) -> L {
-    let [x, y, constant] = [L::single(x), L::single(y), L::single(constant)];
     // SAFETY: there is room for three rows.
-    unsafe {
-        (x ^ flip).store(to);
-        (y ^ flip).store(to.add(4));
-        (constant ^ flip).store(to.add(8));
-    }
-    x.abs().mul_add(hx, y.abs().mul_add(hy, constant.abs()))
+    let [x, y, constant] = unsafe { store_three(coefficients, flip, to) };
+    x.mul_add(hx, y.mul_add(hy, constant))
 }
 
 /// The pairs of axes.

@@ -3,18 +3,21 @@
 //! What bounds the rays of a vector rules out children of a node, eight at once. Then the rays of the
 //! vectors that are left are tested against each child's box, eight rays or more at once.
 
-use super::beam::Obstacles;
 use super::instructions::{Instructions, Pending, lane_of};
 use super::lanes::Lanes;
 use super::layout::{Child, WideNode};
+use super::obstacles::Obstacles;
 use super::triangles::TriangleBlock;
 use core::mem::MaybeUninit;
 
 /// The maximum number of rays.
-pub(super) const RAYS: usize = 64;
+pub(crate) const RAYS: usize = 64;
 
 /// The maximum number of vectors.
 pub(super) const VECTORS: usize = RAYS / 8;
+
+/// The maximum number of rays of a vector.
+pub(super) const LANES: usize = 16;
 
 /// The number of inner children that rays enter untested if they are a node's only ones.
 const FEW: u32 = 2;
@@ -335,4 +338,37 @@ impl Entering {
         let lowest = (self.0 >> child) & 0x0101_0101_0101_0101;
         (lowest.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
     }
+}
+
+/// Coefficients of four triangles, lane by lane.
+pub(super) struct Coefficients<const ROWS: usize>(pub(super) [[f32; 4]; ROWS]);
+
+impl<const ROWS: usize> Coefficients<ROWS> {
+    /// # Safety
+    /// There is such a row, and the lane is one of four.
+    #[inline(always)]
+    pub(super) unsafe fn number(&self, row: usize, lane: usize) -> f32 {
+        // SAFETY: they exist.
+        unsafe { *self.0.get_unchecked(row).get_unchecked(lane) }
+    }
+}
+
+/// Writes three coefficients with flipped signs as rows of four, and returns their sizes.
+///
+/// # Safety
+/// The processor has the instructions of `L`, which has four lanes; there is room for three rows.
+#[inline(always)]
+pub(super) unsafe fn store_three<L: Lanes>(
+    [x, y, z]: [L::Double; 3],
+    flip: L,
+    to: *mut f32,
+) -> [L; 3] {
+    let [x, y, z] = [L::single(x), L::single(y), L::single(z)];
+    // SAFETY: the caller's.
+    unsafe {
+        (x ^ flip).store(to);
+        (y ^ flip).store(to.add(4));
+        (z ^ flip).store(to.add(8));
+    }
+    [x.abs(), y.abs(), z.abs()]
 }

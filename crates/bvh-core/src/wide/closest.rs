@@ -1,13 +1,13 @@
 //! The points of the triangles closest to given points.
 
 use super::answer::NEAREST_HIT;
-use super::beam::Obstacles;
 use super::box_ray::BoxTest;
 use super::double::DWideBvh;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
+use super::obstacles::Obstacles;
 use super::one_ray::{Leaves, visit};
 use super::triangles::TriangleBlock;
 use super::{portable, vector};

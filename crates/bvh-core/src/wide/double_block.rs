@@ -3,8 +3,8 @@
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::triangles::TriangleBlock;
-use crate::double::{NearestHit, largest_axis};
-use crate::exact::{AXES, ERROR, Twice, distance};
+use crate::double::NearestHit;
+use crate::exact::{AXES, ERROR, Twice, distance, largest_axis};
 use crate::{DRay, DTriangle};
 use glam::DVec3;
 

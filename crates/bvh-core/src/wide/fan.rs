@@ -39,13 +39,13 @@
 //!
 //! Rays that are left open are traced by themselves, against that triangle alone.
 
-use super::beam::{Beams, LANES, Obstacles, power_below};
-use super::bundle::{Shape, VECTORS};
+use super::bundle::{Coefficients, LANES, Shape, VECTORS, store_three};
 use super::instructions::Instructions;
 use super::lanes::{Aligned, DoubleLanes, Lanes, Mask};
 use super::layout::WideNode;
+use super::obstacles::{Beams, Obstacles};
 use super::triangles::TriangleBlock;
-use crate::ray::pow2;
+use crate::ray::{pow2, power_below};
 use crate::slabs::{FAR, NEAR};
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
@@ -259,7 +259,7 @@ impl<K: Instructions, O: Obstacles> Shape<K, O> for Pencil<'_, K, O> {
     #[inline(always)]
     unsafe fn shadows(&self, block: &TriangleBlock) -> Projections {
         // SAFETY: the processor has the instructions.
-        unsafe { Projections::new(self, block) }
+        unsafe { Projections::of_pencil(self, block) }
     }
 
     #[inline(always)]
@@ -273,9 +273,9 @@ impl<K: Instructions, O: Obstacles> Shape<K, O> for Pencil<'_, K, O> {
         // SAFETY: the processor has the instructions; the lane is one of four.
         unsafe {
             let along = &self.fan.along[vector];
-            let u = shadows.value(0, lane, along);
-            let v = shadows.value(3, lane, along);
-            let w = shadows.value(6, lane, along);
+            let u = shadows.value_along(0, lane, along);
+            let v = shadows.value_along(3, lane, along);
+            let w = shadows.value_along(6, lane, along);
             let least = u.min(v).min(w);
             let edge_error = shadows.number(Projections::EDGE_ERROR, lane);
             let volume = shadows.number(Projections::VOLUME, lane);
@@ -358,24 +358,16 @@ unsafe fn overlap<L: Lanes>(planes: &[[L; 2]; 3], factors: &[[L; 2]; 3], end: f3
 
 /// The coefficients of four triangles for a point, lane by lane: three for each edge, |V|, and the
 /// bounds of the errors. The signs are those for a positive V.
-pub(super) struct Projections([[f32; 4]; 12]);
+pub(super) type Projections = Coefficients<12>;
 
 impl Projections {
     const VOLUME: usize = 9;
     const EDGE_ERROR: usize = 10;
     const VOLUME_ERROR: usize = 11;
 
-    /// # Safety
-    /// The row is one of twelve and the lane one of four.
-    #[inline(always)]
-    unsafe fn number(&self, row: usize, lane: usize) -> f32 {
-        // SAFETY: they exist.
-        unsafe { *self.0.get_unchecked(row).get_unchecked(lane) }
-    }
-
     /// Returns the products of the three coefficients from a row on and directions.
     #[inline(always)]
-    unsafe fn value<L: Lanes>(&self, row: usize, lane: usize, &[x, y, z]: &[L; 3]) -> L {
+    unsafe fn value_along<L: Lanes>(&self, row: usize, lane: usize, &[x, y, z]: &[L; 3]) -> L {
         // SAFETY: the rows exist.
         unsafe {
             let along_z = x.filled(self.number(row + 2, lane)) * z;
@@ -385,7 +377,7 @@ impl Projections {
     }
 
     #[inline(always)]
-    unsafe fn new<K: Instructions, O: Obstacles>(
+    unsafe fn of_pencil<K: Instructions, O: Obstacles>(
         pencil: &Pencil<'_, K, O>,
         block: &TriangleBlock,
     ) -> Self {
@@ -451,13 +443,8 @@ fn extent<L: Lanes>([x, y, z]: &[L::Double; 3]) -> L {
 
 /// Writes three coefficients with flipped signs as rows of four, and returns the sum of their sizes.
 #[inline(always)]
-unsafe fn write<L: Lanes>([x, y, z]: [L::Double; 3], flip: L, to: *mut f32) -> L {
-    let [x, y, z] = [L::single(x), L::single(y), L::single(z)];
+unsafe fn write<L: Lanes>(coefficients: [L::Double; 3], flip: L, to: *mut f32) -> L {
     // SAFETY: there is room for three rows.
-    unsafe {
-        (x ^ flip).store(to);
-        (y ^ flip).store(to.add(4));
-        (z ^ flip).store(to.add(8));
-    }
-    x.abs() + y.abs() + z.abs()
+    let [x, y, z] = unsafe { store_three(coefficients, flip, to) };
+    x + y + z
 }

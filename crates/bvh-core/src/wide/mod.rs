@@ -47,9 +47,10 @@ mod triangles;
     path = "simd128/mod.rs"
 )]
 mod vector;
+mod views;
 
 pub use batch::Coherence;
-pub(crate) use beam::{Beams, POINTS as POINTS_OF_BEAM, transpose};
+pub(crate) use bundle::RAYS as POINTS_OF_BEAM;
 pub use closest::Closest;
 pub(crate) use decide::{BLOCK_COST, NODE_COST};
 pub use double::DWideBvh;
@@ -58,10 +59,12 @@ pub use kernel::Kernel;
 pub use layout::WideBvh;
 pub(crate) use layout::WideNode;
 pub use neighbours::neighbours;
+pub(crate) use obstacles::Beams;
 pub use refit::RefitError;
 #[doc(hidden)]
 pub use tightness::NodeTest;
 pub(crate) use triangles::TriangleBlock;
+pub(crate) use views::transpose;
 
 use crate::{Bvh, Counter, Hit, InFrame, InvalidBvh, Ray, Triangle, validate_references};
 use answer::{ANY_HIT, NEAREST_HIT};

@@ -1,6 +1,7 @@
 //! Points in an order in which neighbours follow each other.
 
 use super::POINTS_OF_BEAM;
+use crate::exact::largest_axis;
 use glam::DVec3;
 
 /// The number of points whose order does not matter.
@@ -30,8 +31,8 @@ pub fn neighbours<P: Copy + Into<DVec3>>(points: &[P]) -> Vec<u32> {
                 most[axis] = most[axis].max(place[axis]);
             }
         }
-        let [x, y, z] = [0, 1, 2].map(|k| f32::from_bits(most[k]) - f32::from_bits(least[k]));
-        let axis = if z > x.max(y) { 2 } else { usize::from(y > x) };
+        let size = [0, 1, 2].map(|k| f32::from_bits(most[k]) - f32::from_bits(least[k]));
+        let axis = largest_axis(size.map(f64::from).into());
         // Beams begin at multiples of their size, and end between halves.
         let unit = if count > POINTS_OF_BEAM { POINTS_OF_BEAM } else { FEW };
         let middle = (count / 2).div_ceil(unit) * unit;

@@ -1,6 +1,5 @@
-//! The layouts in f32 and in f64 as what stops beams.
+//! What stops beams and fans, in f32 and in f64, and the points and directions that they are of.
 
-use super::beam::Obstacles;
 use super::double::DWideBvh;
 use super::double_block::corners_of;
 use super::lanes::Lanes;
@@ -8,6 +7,62 @@ use super::layout::WideBvh;
 use super::triangles::TriangleBlock;
 use crate::{Coherence, DRay, PreparedRay, Ray, Select};
 use glam::{DVec3, Vec3};
+
+/// The triangles that stop beams, in f32 or f64, laid out.
+pub(crate) trait Obstacles {
+    /// A point.
+    type Point: Copy + Into<DVec3>;
+    /// A ray.
+    type Ray;
+
+    /// The layout of the boxes.
+    fn boxes(&self) -> &WideBvh;
+
+    /// The point in f64.
+    fn point(point: Self::Point) -> DVec3;
+
+    /// Returns a bound of the coordinates of all corners relative to a point.
+    fn reach(&self, point: DVec3) -> f64;
+
+    /// The ray from a point, over the range of beams.
+    fn ray(&self, point: Self::Point, direction: DVec3, range: [f64; 2]) -> Self::Ray;
+
+    /// Returns the ray as boxes are tested with it.
+    fn boxed(&self, ray: &Self::Ray) -> Ray;
+
+    /// Returns the corners of a block's triangles along some axes.
+    unsafe fn corners<L: Lanes>(
+        &self,
+        block: &TriangleBlock,
+        axes: [usize; 3],
+    ) -> [[L::Double; 3]; 3];
+
+    /// Returns whether the triangle in a lane of a block stops a ray.
+    fn stops(&self, ray: &Self::Ray, block: &TriangleBlock, lane: usize) -> bool;
+
+    /// Writes whether anything stops each ray.
+    fn are_stopped(&self, rays: &[Self::Ray], stopped: &mut [bool]);
+}
+
+/// Neighbouring points, and the directions in which they look.
+pub(crate) struct Beams<'a, O: Obstacles> {
+    pub(crate) obstacles: &'a O,
+    /// At most 64, at least one.
+    pub(crate) points: &'a [O::Point],
+    /// Only directions above the surface count.
+    pub(crate) normals: Option<&'a [O::Point]>,
+    pub(crate) directions: &'a [DVec3],
+    pub(crate) range: [f64; 2],
+}
+
+impl<O: Obstacles> Beams<'_, O> {
+    /// Returns whether a direction is above the surface at a point.
+    #[inline(always)]
+    pub(super) fn is_above(&self, point: usize, direction: DVec3) -> bool {
+        // A tiny normal counts, too.
+        self.normals.is_none_or(|normals| normals[point].into().dot(direction) > 0.0)
+    }
+}
 
 impl Obstacles for WideBvh {
     type Point = Vec3;
