@@ -18,6 +18,8 @@ const GUARD: usize = 4;
 /// The part of the way to a hit after which the next ray begins: before the surface.
 const JUST_BEFORE: f32 = 0.9999;
 
+const NONE: TestCounts = TestCounts { boxes: 0, objects: 0 };
+
 /// Returns the density of recorded segments between the surfaces of a scene, with a tenth of area.
 /// The segments begin where rays began and end at their hits or outside the scene. If the `shapes`
 /// are known, in f32, a quarter of the density's rays comes from anywhere in the scene, so that rays from
@@ -41,12 +43,11 @@ pub fn ray_density(
     let step = segments.len().div_ceil(most).max(1);
     let mut sampled: Vec<Segment> = segments.iter().step_by(step).copied().collect();
     let count = sampled.len() / (GUARD - 1);
-    let none = TestCounts::default();
     sampled.extend(match shapes {
         Some(Primitives::Triangles(triangles)) => {
-            traced(tree, triangles, &bounds, count, none, is_over)
+            traced(tree, triangles, &bounds, count, NONE, is_over)
         }
-        Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &bounds, count, none, is_over),
+        Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &bounds, count, NONE, is_over),
         Some(Primitives::Doubles(_)) | None => vec![],
     });
     if is_over() {
@@ -123,8 +124,6 @@ mod tests {
         let tree = median_cut::Config::default().build(&bvh_core::boxes(&triangles)).unwrap();
         (triangles.clone(), Primitives::Triangles(triangles), tree)
     }
-
-    const NONE: TestCounts = TestCounts { boxes: 0, objects: 0 };
 
     /// Ends at the first wall.
     const RECORDED: Segment = Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] };

@@ -11,7 +11,7 @@ use glam::DVec3;
 const RAYS: u32 = 4096;
 /// The tests after which no more rays are traced: half a second. Where objects are as large as the
 /// scene, fewer rays must do.
-const MOST_TESTS: u64 = if cfg!(test) { 1 << 21 } else { 1 << 26 };
+const MOST_TESTS: u64 = 1 << 26;
 
 /// A tree for a tracer, by [`Target::fit_better`].
 #[derive(Clone, Debug, PartialEq)]
@@ -44,14 +44,20 @@ impl Target {
     /// axis. O(objects), and a few thousand rays.
     pub fn fit_better(&self, searched: &Bvh, own: &Bvh, triangles: &[Triangle]) -> Better {
         let [searched, own] = [self.fit(searched), self.fit(own)];
-        let [ours, theirs] = self.counted_costs([&searched, &own], triangles);
+        let [ours, theirs] = self.counted_costs([&searched, &own], triangles, MOST_TESTS);
         let gains = [theirs[0] / ours[0], theirs[1] / ours[1]];
         let better = Better { tree: searched, gains };
         if better.is_searched() { better } else { Better { tree: own, ..better } }
     }
 
-    /// Returns the costs of all rays of each kind in each of two fitted trees.
-    fn counted_costs(&self, trees: [&Bvh; 2], triangles: &[Triangle]) -> [[f64; 2]; 2] {
+    /// Returns the costs of all rays of each kind in each of two fitted trees, or of as many as take
+    /// few tests.
+    fn counted_costs(
+        &self,
+        trees: [&Bvh; 2],
+        triangles: &[Triangle],
+        most_tests: u64,
+    ) -> [[f64; 2]; 2] {
         let mut costs = [[0.0; 2]; 2];
         let Some(bounds) = trees[0].root_aabb() else { return costs };
         let nodes = trees.map(|tree| match self.layout {
@@ -80,7 +86,7 @@ impl Target {
                 costs[0] += cost(which, pair[0], &mut tests);
                 costs[1] += cost(which, pair[1], &mut tests);
             }
-            if tests > MOST_TESTS {
+            if tests > most_tests {
                 break;
             }
         }
@@ -206,7 +212,7 @@ mod tests {
         let leaf = Node::leaf(triangles[0].aabb(), 0, 30_000);
         let tree = Bvh { nodes: vec![leaf], prim_ids: (0..30_000).collect(), ..Bvh::default() };
         for target in [Target::PLAIN, Target::THREE_MESH_BVH] {
-            let costs = target.counted_costs([&tree; 2], &triangles);
+            let costs = target.counted_costs([&tree; 2], &triangles, 1 << 21);
             assert_eq!(costs[0], costs[1]);
             assert!(costs[0].iter().all(|&cost| (1e5..1e7).contains(&cost)), "{costs:?}");
         }

@@ -65,8 +65,6 @@ impl Build<'_> {
             whole[first][0] = whole[first][0].union(&reference.aabb);
             whole[last][1] = whole[last][1].union(&reference.aabb);
         }
-        // A side with all references divides nothing.
-        let divides = |sides: [usize; 2]| sides.iter().all(|side| (1..all).contains(side));
         // A side costs at least as much as with the references alone that no plane cuts. If no
         // plane divides anything for less than `most` even so, the parts need not be clipped.
         let mut behind = vec![Aabb::EMPTY; bins + 1];
@@ -81,7 +79,7 @@ impl Build<'_> {
             entered += parts[bin - 1].1;
             gone += parts[bin - 1].2;
             let left = all - gone;
-            divides([entered, left])
+            divides([entered, left], all)
                 && self.cost(&before, entered) + self.cost(&behind[bin], left) < most
         });
         if !may_pay {
@@ -115,7 +113,7 @@ impl Build<'_> {
             before = before.union(&parts[bin - 1].0);
             entered += parts[bin - 1].1;
             let (ref behind, left) = after[bin];
-            if !divides([entered, left]) || entered + left - all > self.extra {
+            if !divides([entered, left], all) || entered + left - all > self.extra {
                 continue;
             }
             let cost = self.cost(&before, entered) + self.cost(behind, left);
@@ -174,7 +172,7 @@ impl Build<'_> {
         }
         let [left, right] = sides.each_ref().map(Vec::len);
         let all = references.len();
-        if left.min(right) == 0 || left.max(right) >= all || left + right - all > self.extra {
+        if !divides([left, right], all) || left + right - all > self.extra {
             return None;
         }
         // Unsplitting may have left a side with a smaller box than the decisions assumed.
@@ -185,4 +183,9 @@ impl Build<'_> {
             references: sides,
         })
     }
+}
+
+/// Returns whether sides of so many references divide `all`: a side with all of them divides nothing.
+fn divides(sides: [usize; 2], all: usize) -> bool {
+    sides.iter().all(|side| (1..all).contains(side))
 }
