@@ -221,6 +221,20 @@ static double seconds(void) {
     return (double)time.tv_sec + (double)time.tv_nsec * 1e-9;
 }
 
+/* sky_open3d.py reads the scene and prints a row. */
+static void trace_by_open3d(const char *scene, size_t free_count) {
+    const char *command = getenv("OPEN3D");
+    FILE *pipe = command ? popen(command, "w") : NULL;
+    if (!pipe) return;
+    float rounded[DIRECTIONS][3];
+    for (int j = 0; j < DIRECTIONS; j++)
+        for (int k = 0; k < 3; k++) rounded[j][k] = (float)directions[j][k];
+    fprintf(pipe, "%s\t%zu\t%zu\t%d\t%zu\n", scene, triangle_count, point_count, DIRECTIONS, free_count);
+    fwrite(triangles, sizeof *triangles, triangle_count, pipe);
+    fwrite(points, sizeof *points, point_count, pipe), fwrite(rounded, sizeof rounded, 1, pipe);
+    if (pclose(pipe)) exit(EXIT_FAILURE);
+}
+
 static void measure(const char *scene, void *device) {
     BvsTree *tree = bvs_tree_from_triangles(triangles[0][0], triangle_count, 5, 1);
     tracer = tree ? bvs_tracer_new(tree) : NULL;
@@ -251,6 +265,7 @@ static void measure(const char *scene, void *device) {
                    WAYS[i].mode, speeds[i][ROUNDS / 2], speeds[i][0], speeds[i][ROUNDS - 1], (double)found[i] / rays);
         }
         fflush(stdout);
+        trace_by_open3d(scene, found[0]);
         free(points), free(sorted);
     }
     rtcReleaseScene(embree), bvs_tracer_free(tracer), bvs_tree_free(tree);
