@@ -8,7 +8,9 @@
 #include "bvh_search.h"
 #include "embree.h"
 
-enum { DIRECTIONS = 145, ROUNDS = 5, GROUP = 16 };
+/* Rays of the sample are at most this long, which is beyond every scene. */
+#define FAR 1e4f
+enum { DIRECTIONS = 145, ROUNDS = 5, GROUP = 16, SAMPLE = 20000 };
 
 typedef float Triangle[3][3];
 static Triangle *triangles;
@@ -235,10 +237,38 @@ static void trace_by_open3d(const char *scene, size_t free_count) {
     if (pclose(pipe)) exit(EXIT_FAILURE);
 }
 
-static void measure(const char *scene, void *device) {
-    BvsTree *tree = bvs_tree_from_triangles(triangles[0][0], triangle_count, 5, 1);
+/* Bakes for five seconds, for these rays if there are any, which end at their hits. */
+static BvsTree *bake(const float *rays, size_t count) {
+    BvsBake bake = {.rays = rays, .ray_count = count, .seconds = 5, .seed = 1, .frame = 1};
+    bake.objects.count = triangle_count, bake.objects.vertices = triangles[0][0];
+    BvsTree *tree = bvs_tree_bake(&bake);
     tracer = tree ? bvs_tracer_new(tree) : NULL;
     if (!tracer) puts(bvs_last_error()), exit(EXIT_FAILURE);
+    return tree;
+}
+
+/* Bakes for such rays as will be traced: a sample of them, from points of its own. */
+static BvsTree *bake_for_the_sky(void) {
+    static float rays[SAMPLE][2][3];
+    BvsTree *plain = bake(NULL, 0);
+    scatter(SAMPLE);
+    for (int i = 0; i < SAMPLE; i++) {
+        const double *d = directions[(size_t)(uniform() * DIRECTIONS)];
+        BvsRay ray = {{points[i][0], points[i][1], points[i][2]}, 0, {(float)d[0], (float)d[1], (float)d[2]}, FAR};
+        BvsHit hit;
+        if (bvs_nearest(tracer, &ray, &hit)) puts(bvs_last_error()), exit(EXIT_FAILURE);
+        for (int k = 0; k < 3; k++) {
+            rays[i][0][k] = ray.origin[k];
+            rays[i][1][k] = ray.origin[k] + fminf(hit.t, FAR) * ray.direction[k];
+        }
+    }
+    free(points), free(sorted);
+    bvs_tracer_free(tracer), bvs_tree_free(plain);
+    return bake(rays[0][0], SAMPLE);
+}
+
+static void measure(const char *scene, void *device) {
+    BvsTree *tree = bake_for_the_sky();
     embree = rtcNewScene(device);
     embree_build(device, embree, triangles[0][0], triangle_count);
     static const size_t COUNTS[] = {30000, 300000};
