@@ -24,13 +24,13 @@ inline Position at(const Position& from, const Direction& direction, double t) {
   return {from.x + t * direction.x, from.y + t * direction.y, from.z + t * direction.z};
 }
 
-// Two halves of a box, in a ball, in a larger box, turned and far from the origin.
+// Two halves of a box, in a ball, in a larger box, straight or turned, and far from the origin.
 class Solids : public AnyMesh {
 public:
   enum Volume { LEFT = 1, RIGHT, BALL, SPACE, OUTSIDE };
   static constexpr std::array<MeshID, 5> VOLUMES{LEFT, RIGHT, BALL, SPACE, OUTSIDE};
 
-  explicit Solids(double offset) : offset_(offset) {
+  explicit Solids(double offset, bool is_turned = true) : is_turned(is_turned), offset_(offset) {
     add_box({-1, -1, -1}, {0, 1, 1}, 1, LEFT, BALL);
     add_box({0, -1, -1}, {1, 1, 1}, 0, RIGHT, BALL);
     // The middle, whose normals point to the right.
@@ -40,8 +40,11 @@ public:
     add_box({-10, -10, -10}, {10, 10, 10}, 6, SPACE, OUTSIDE);
   }
 
+  const bool is_turned;
+
   // The place of a point of the drawing, which is not turned and lies at the origin.
   Position place(double x, double y, double z) const {
+    if (!is_turned) return {x + offset_, y + offset_, z - offset_};
     const double c = std::cos(0.3), s = std::sin(0.3), k = std::cos(1.1), l = std::sin(1.1);
     double u = c * x - s * y, v = s * x + c * y;
     return {u + offset_, k * v - l * z + offset_, l * v + k * z - offset_};
@@ -146,6 +149,8 @@ struct Flight {
 // Particles fly straight from face to face, from each hit point without the faces there, and one step
 // in four ends before the face, in another direction. One direction in three is that of an edge of the
 // box, and of these every second that of a corner: rounding carries hit points across two faces there.
+// Among straight solids, every second particle begins on a grid and flies along an axis or a diagonal:
+// it meets edges and corners exactly.
 inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, long steps, uint64_t seed, int look) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -171,6 +176,15 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
   while (flight.steps < steps) {
     Position point = mesh.place(unit(random) * 8 - 4, unit(random) * 8 - 4, unit(random) * 8 - 4);
     Direction along = direction(point);
+    if (!mesh.is_turned && random() % 2) {
+      auto odd_eighth = [&] { return (2 * double(random() % 32) - 31) / 8; };
+      point = mesh.place(odd_eighth(), odd_eighth(), odd_eighth());
+      int sides = 1 + int(random() % 26);
+      double x = sides % 3 - 1, y = sides / 3 % 3 - 1, z = sides / 9 - 1;
+      if (x == 0 && y == 0 && z == 0) x = y = 1;
+      double length = std::sqrt(x * x + y * y + z * z);
+      along = {x / length, y / length, z / length};
+    }
     MeshID volume = Solids::LEFT;
     while (volume < Solids::OUTSIDE && !is_in(volume, point)) volume++;
     std::vector<MeshID> passed;

@@ -18,8 +18,8 @@ static void is_near(double found, double expected, const char* what) {
   expect(std::fabs(found - expected) < 1e-8, what, found);
 }
 
-static void check(double offset, long steps) {
-  auto mesh = std::make_shared<Solids>(offset);
+static void check(double offset, bool is_turned, long steps) {
+  auto mesh = std::make_shared<Solids>(offset, is_turned);
   BvhRayTracer tracer;
   Trees trees(tracer, mesh);
   auto tree = [&](MeshID volume) { return trees.of_volume.at(volume); };
@@ -68,7 +68,7 @@ static void check(double offset, long steps) {
   for (long points : inside) expect(points > 100, "points of a volume", double(points));
 
   Flight flight = fly(tracer, trees, *mesh, steps, 2, 16);
-  std::printf("transport: offset %g: %ld steps, %ld particles lost, %ld of %ld misplaced\n", offset, flight.steps,
+  std::printf("transport: %s, offset %g: %ld steps, %ld particles lost, %ld of %ld misplaced\n", is_turned ? "turned" : "straight", offset, flight.steps,
               flight.lost, flight.misplaced, flight.looked_at);
   expect(flight.lost == 0, "lost particles", double(flight.lost));
   expect(flight.misplaced == 0, "misplaced particles", double(flight.misplaced));
@@ -76,5 +76,6 @@ static void check(double offset, long steps) {
 
 int main(int count, char** arguments) {
   long steps = count > 1 ? std::atol(arguments[1]) : 200000;
-  for (double offset : {0.0, 5412345.678}) check(offset, steps);
+  for (bool is_turned : {true, false})
+    for (double offset : {0.0, 5412345.678}) check(offset, is_turned, steps);
 }

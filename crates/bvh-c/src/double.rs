@@ -71,8 +71,10 @@ pub enum BvsOrientation {
     /// Either side. A ray in the plane of a triangle never hits it, whatever the orientation.
     Any = 0,
     /// Along the normal, on whose side the corners run counterclockwise: the ray leaves a solid.
+    /// Each crossing of the surface counts once, as in `bvs_tracer_all_hits`: a ray that touches an
+    /// edge or a corner enters as often as it leaves.
     Exiting = 1,
-    /// Against the normal: the ray enters a solid.
+    /// Against the normal: the ray enters a solid. Crossings count in the same way.
     Entering = 2,
 }
 

@@ -18,7 +18,7 @@ pub struct BvsSky {
     /// The smallest distance, in multiples of a direction's length: 0 or more. A `BvsTracer` rounds
     /// both distances to floats.
     pub t_min: f64,
-    /// The largest distance; it may be infinite.
+    /// The largest distance; 0 is no limit.
     pub t_max: f64,
     /// `columns` doubles for each direction. Null makes every direction weigh 1, in one column.
     pub weights: *const f64,
@@ -104,6 +104,7 @@ unsafe fn visible<L: Traced>(
     // SAFETY: what the caller promises.
     let directions = unsafe { slice("directions", directions.cast::<[f64; 3]>(), width) }?;
     let directions = directions.iter().map(|&direction| DVec3::from(direction)).collect();
+    let t_max = if t_max == 0.0 { f64::INFINITY } else { t_max };
     let mut sky = Sky::new(directions, [t_min, t_max]).map_err(Failure::invalid)?;
     let columns = if weights.is_null() { 1 } else { columns };
     if !weights.is_null() && width > 0 {

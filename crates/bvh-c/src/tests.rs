@@ -501,7 +501,7 @@ fn invalid_arguments_are_rejected_by_name() {
     unsafe {
         for (corners, count, seconds, references, message) in [
             (wrong.as_ptr(), 5, 0.0, 1.0, "vertex 9 of triangle 3 is [NaN, "),
-            (null(), 5, 0.0, 1.0, "vertices is null"),
+            (null(), 5, 0.0, 1.0, "boxes, vertices and vertices_f64 are null"),
             (wrong.as_ptr().byte_add(1), 5, 0.0, 1.0, "vertices is not aligned to a multiple of 4"),
             (wrong.as_ptr(), usize::MAX, 0.0, 1.0, "more than memory has"),
             (right.as_ptr(), 5, 0.0, f64::NAN, "references is NaN; accepted: 1 to 16"),
@@ -533,7 +533,7 @@ fn invalid_arguments_are_rejected_by_name() {
             BvsObjects { count: 2, vertex_count: 15, indices: ids.as_ptr(), ..soup(&wrong) };
         for (objects, message) in [
             (BvsObjects { boxes: wrong.as_ptr(), ..indexed }, "several of boxes, vertices and "),
-            (BvsObjects { vertices: null(), ..indexed }, "vertices is null"),
+            (BvsObjects { vertices: null(), ..indexed }, "boxes, vertices and vertices_f64 are null"),
             (indexed, "triangle 1 has vertex 15 of 15, counted from 0"),
             (BvsObjects { vertex_stride: 8, ..indexed }, "vertices has a stride of 8 bytes"),
             (BvsObjects { index_stride: 14, ..indexed }, "indices has a stride of 14 bytes"),

@@ -197,6 +197,11 @@ impl DRay {
 }
 
 /// The side from which a ray comes to the triangles that it hits.
+///
+/// A ray through an edge or a corner of a solid meets several closed triangles there, and may only
+/// touch the solid. Of a given side, only *crossings* count, by the rule of
+/// [`Triangle::crossing`](crate::Triangle::crossing): from a point outside, a closed surface is left as
+/// often as it is entered, from a point inside once more.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Orientation {
     /// Either side.
@@ -231,12 +236,12 @@ impl<'a> Select<'a> {
     pub fn filter(self, ray: &'a Ray, triangles: &'a [Triangle]) -> impl FnMut(Hit) -> bool + 'a {
         move |Hit { object, .. }| {
             let Triangle(corners) = &triangles[object as usize];
-            self.admits(object, || ray.line().side(corners))
+            self.admits(object, || ray.line().crossed_side(corners))
         }
     }
 
-    /// Returns whether a hit counts on a triangle to which the ray comes from a
-    /// [side](Line::side).
+    /// Returns whether a hit counts on a triangle that the ray crosses from a
+    /// [side](Line::crossed_side).
     fn admits(&self, object: u32, side: impl FnOnce() -> i32) -> bool {
         !self.exclude.contains(&object)
             && match self.orientation {
@@ -441,7 +446,7 @@ impl Query<'_> {
     #[inline(never)]
     pub(crate) fn counts(&self, object: u32) -> bool {
         let DTriangle(corners) = &self.triangles[object as usize];
-        self.select.admits(object, || self.ray.line().side(corners))
+        self.select.admits(object, || self.ray.line().crossed_side(corners))
     }
 
     /// Finds bounds of the distance in f64.

@@ -216,10 +216,22 @@ impl Line {
         if low >= 0.0 { Verdict::Between(low, high) } else { Verdict::Unsure }
     }
 
+    /// Returns the side from which the ray crosses a triangle by the rule of
+    /// [`Triangle::crossing`](crate::Triangle::crossing): 1 along the normal, −1 against it, and 0 if it
+    /// does not.
+    pub(crate) fn crossed_side<P: Point>(&self, triangle: &[P; 3]) -> i32 {
+        let is_crossed = match self.filter(triangle) {
+            Verdict::Miss => false,
+            Verdict::Between(..) => true,
+            Verdict::Unsure => self.distance(triangle, true).is_some(),
+        };
+        if is_crossed { self.side(triangle) } else { 0 }
+    }
+
     /// Returns the side from which the line comes to a triangle that it crosses: 1 along the normal,
     /// −1 against it, and 0 for a line parallel to its plane.
     #[inline]
-    pub(crate) fn side<P: Point>(&self, triangle: &[P; 3]) -> i32 {
+    fn side<P: Point>(&self, triangle: &[P; 3]) -> i32 {
         let [first, second, third] = *triangle;
         let (normal, products) = normal(&self.edge(first, second), &self.edge(first, third));
         let along = dot(&self.direction, &normal);

@@ -107,7 +107,10 @@ fn hits_and_distances_are_those_of_real_arithmetic_rounded_once() {
 /// Returns the nearest hit that counts, by testing every triangle.
 fn brute_force(triangles: &[DTriangle], ray: &DRay, select: Select) -> Option<DHit> {
     let hit = |(object, triangle): (u32, &DTriangle)| {
-        let t = triangle.intersect(ray)?;
+        let t = match select.orientation {
+            Orientation::Any => triangle.intersect(ray)?,
+            _ => triangle.crossing(ray)?,
+        };
         let is_exiting = dot(&exactly(ray.direction()), &normal(triangle.0)) > zero();
         let counts = match select.orientation {
             Orientation::Any => true,
@@ -321,4 +324,59 @@ fn a_point_beyond_f32_has_a_closest_point_unless_its_square_overflows() {
             }
         }
     }
+}
+
+/// A cube around 0 between −1 and 1, whose sides are divided along one of the two diagonals.
+fn cube(is_other: bool) -> Vec<DTriangle> {
+    let mut triangles = Vec::new();
+    for (axis, sign) in [0, 1, 2].into_iter().flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+        let [normal, right] = [DVec3::AXES[axis] * sign, DVec3::AXES[(axis + 1) % 3]];
+        let up = normal.cross(right);
+        let [a, b, c, d] =
+            [-right - up, right - up, right + up, up - right].map(|corner| normal + corner);
+        let halves = if is_other { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] };
+        triangles.extend(halves.map(DTriangle));
+    }
+    triangles
+}
+
+#[test]
+fn flights_through_corners_and_edges_of_a_solid_enter_it_as_often_as_they_leave_it() {
+    let mut random = Random(71);
+    let [mut touched, mut crossed] = [0; 2];
+    for triangles in [cube(false), cube(true)] {
+        for tree in trees(&triangles, &mut random) {
+            let layout = DWideBvh::new(&tree, &triangles).unwrap();
+            for _ in 0..2000 {
+                // All numbers are small whole ones, and the ray meets its aim exactly.
+                let mut whole = |most: usize| {
+                    let mut number = || random.below(2 * most + 1) as f64 - most as f64;
+                    DVec3::new(number(), number(), number())
+                };
+                let (aim, origin) = (whole(1), whole(7));
+                if origin.abs().max_element() <= 1.0 {
+                    continue;
+                }
+                let (mut is_inside, mut t, mut passed) = (false, 0.0, Vec::new());
+                let mut faces = 0;
+                loop {
+                    let ray = DRay::new(origin, aim - origin, t, f64::MAX).unwrap();
+                    let orientation =
+                        if is_inside { Orientation::Exiting } else { Orientation::Entering };
+                    let select = Select { orientation, exclude: &passed };
+                    let Some(hit) = layout.nearest_hit(&ray, select) else { break };
+                    if hit.t > t {
+                        passed.clear();
+                    }
+                    passed.push(hit.object);
+                    (is_inside, t) = (!is_inside, hit.t);
+                    faces += 1;
+                }
+                assert!(!is_inside, "from {origin} to {aim}");
+                touched += usize::from(faces == 0);
+                crossed += usize::from(faces > 0);
+            }
+        }
+    }
+    assert!(touched > 1000 && crossed > 1000, "{touched} {crossed}");
 }

@@ -433,7 +433,9 @@ fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
             let kept = all.iter().copied().filter(|hit| {
                 let [a, b, c] = triangles[hit.object as usize].0.map(Vec3::as_dvec3);
                 let along = (b - a).cross(c - a).dot(ray.direction().as_dvec3());
-                let counts = [true, along > 0.0, along < 0.0][orientation as usize];
+                let is_crossed = triangles[hit.object as usize].crossing(&ray).is_some();
+                let sides = [true, is_crossed && along > 0.0, is_crossed && along < 0.0];
+                let counts = sides[orientation as usize];
                 counts && !excluded.contains(&hit.object)
             });
             (Select { orientation, exclude: &excluded }, kept.reduce(first))

@@ -222,7 +222,8 @@ class Tracer:
 
     `nearest` and `any` choose which triangles count: those with the `orientation` `"exiting"`, which the ray meets along their normal as where it leaves a solid,
     `"entering"`, against it, or `"any"`, and none of the indices `exclude`. That is one index,
-    an array `(m,)` or `(m, k)` of some for each ray; -1 excludes nothing.
+    an array `(m,)` or `(m, k)` of some for each ray; -1 excludes nothing. Of a side, each crossing of
+    the surface counts once: a ray that touches a corner enters as often as it leaves.
 
     Ctrl-C ends every call. `progress(seconds, fraction)` is called about twenty times per second with
     the elapsed time and the part of the rays or points that is answered, and at the end with 1; if it
