@@ -141,7 +141,7 @@ struct Flight {
   long steps = 0;
   // Particles that no face of their volume stops.
   long lost = 0;
-  // Steps whose middle is not in the particle's volume alone, of those that are looked at.
+  // Steps of which a point is not in the particle's volume alone, of those that are looked at.
   long misplaced = 0;
   long looked_at = 0;
 };
@@ -199,13 +199,16 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
       const bool is_between = t > 1e-6;
       if (is_between && flight.steps % look == 0) {
         flight.looked_at++;
+        // Not in the middle, where a ray may touch an edge of a smaller volume.
+        const Position within = at(point, along, t * (0.1 + 0.8 * unit(random)));
         for (MeshID other = Solids::LEFT; other < Solids::OUTSIDE; other++)
-          if (is_in(other, at(point, along, t / 2)) != (other == volume)) {
+          if (is_in(other, within) != (other == volume)) {
             flight.misplaced++;
             break;
           }
       }
-      if (is_between && random() % 4 == 0) {
+      // Nearer to a face, rounding may carry the place across it.
+      if (t > 1e-2 && random() % 4 == 0) {
         point = at(point, along, t * (0.01 + 0.98 * unit(random)));
         along = direction(point);
         passed.clear();
