@@ -173,7 +173,7 @@ impl Sky {
     ///
     /// `order` has the numbers of the points; fastest where [`neighbours`](crate::neighbours) follow
     /// each other.
-    /// Memory for 64 points at a time.
+    /// Memory for 128 points at a time.
     ///
     /// # Panics
     /// If there are not as many normals as points, or fewer points than a number says.
@@ -192,7 +192,7 @@ impl Sky {
         let mut points = Vec::with_capacity(POINTS_OF_BEAM);
         let mut normals = Vec::with_capacity(POINTS_OF_BEAM);
         let mut rows = vec![0; POINTS_OF_BEAM * words];
-        let mut free = vec![0; 64 * words];
+        let mut parts = [(); POINTS_OF_BEAM / 64].map(|()| vec![0; 64 * words]);
         for numbers in order.chunks(POINTS_OF_BEAM) {
             let at = |from: &[L::Point], to: &mut Vec<L::Point>| {
                 to.clear();
@@ -201,14 +201,18 @@ impl Sky {
             at(view.points, &mut points);
             view.normals.iter().for_each(|from| at(from, &mut normals));
             let above = view.normals.map(|_| &normals[..]);
-            free.fill(0);
+            parts.iter_mut().for_each(|free| free.fill(0));
             layout.look(&points, above, &directions, range, &mut |direction, bits| {
-                free[direction] = bits;
+                for (part, free) in parts.iter_mut().enumerate() {
+                    free[direction] |= (bits >> (64 * part)) as u64;
+                }
             });
-            for (word, free) in free.as_chunks_mut().0.iter_mut().enumerate() {
-                transpose(free);
-                for (row, &bits) in rows.chunks_exact_mut(words).zip(&*free) {
-                    row[word] = bits;
+            for (free, rows) in parts.iter_mut().zip(rows.chunks_mut((64 * words).max(1))) {
+                for (word, free) in free.as_chunks_mut().0.iter_mut().enumerate() {
+                    transpose(free);
+                    for (row, &bits) in rows.chunks_exact_mut(words).zip(&*free) {
+                        row[word] = bits;
+                    }
                 }
             }
             for (place, &number) in numbers.iter().enumerate() {

@@ -195,8 +195,9 @@ pub trait Traced {
     #[doc(hidden)]
     fn as_of_rays(directions: &[DVec3], range: [f64; 2]) -> (Vec<DVec3>, [f64; 2]);
 
-    /// Passes for each of these directions its number and a bit for each of at most 64 points from which it is
-    /// free over a range, and above the surface if there are normals.
+    /// Passes for each of these directions its number and a bit for each of at most 128 points from
+    /// which it is free over a range, and above the surface if there are normals; for some of the
+    /// points at a time.
     #[doc(hidden)]
     fn look(
         &self,
@@ -204,7 +205,7 @@ pub trait Traced {
         normals: Option<&[Self::Point]>,
         directions: &[DVec3],
         range: [f64; 2],
-        free: &mut dyn FnMut(usize, u64),
+        free: &mut dyn FnMut(usize, u128),
     );
 }
 
@@ -245,7 +246,7 @@ impl Traced for WideBvh {
         normals: Option<&[Vec3]>,
         directions: &[DVec3],
         range: [f64; 2],
-        free: &mut dyn FnMut(usize, u64),
+        free: &mut dyn FnMut(usize, u128),
     ) {
         Beams { obstacles: self, points, normals, directions, range }.trace(free);
     }
@@ -280,7 +281,7 @@ impl Traced for DWideBvh {
         normals: Option<&[DVec3]>,
         directions: &[DVec3],
         range: [f64; 2],
-        free: &mut dyn FnMut(usize, u64),
+        free: &mut dyn FnMut(usize, u128),
     ) {
         Beams { obstacles: self, points, normals, directions, range }.trace(free);
     }

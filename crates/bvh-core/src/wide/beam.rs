@@ -62,7 +62,7 @@
 //!
 //! Rays that are left open are traced by themselves, against that triangle alone.
 
-use super::bundle::{Coefficients, LANES, RAYS, Shape, VECTORS, store_three};
+use super::bundle::{Coefficients, LANES, Shape, VECTORS, store_three};
 use super::instructions::Instructions;
 use super::lanes::{Aligned, DoubleLanes, Lanes, Mask};
 use super::layout::WideNode;
@@ -99,7 +99,7 @@ pub(super) struct Group<K: Instructions> {
 impl<K: Instructions> Group<K> {
     #[inline(always)]
     pub(super) unsafe fn new<O: Obstacles>(beams: &Beams<'_, O>, origins: &[Vec3]) -> Self {
-        const { assert!(RAYS / VECTORS <= K::Rays::N && K::Rays::N <= LANES) };
+        const { assert!(VECTORS <= K::Rays::N && K::Rays::N <= LANES) };
         let points = || beams.points.iter().map(|&point| O::point(point));
         let min = points().fold(DVec3::INFINITY, DVec3::min);
         let max = points().fold(DVec3::NEG_INFINITY, DVec3::max);

@@ -1,4 +1,4 @@
-//! Bundles: up to 64 rays that go through the tree together.
+//! Bundles: up to 128 rays that go through the tree together.
 //!
 //! What bounds the rays of a vector rules out children of a node, eight at once. Then the rays of the
 //! vectors that are left are tested against each child's box, eight rays or more at once.
@@ -10,14 +10,14 @@ use super::obstacles::Obstacles;
 use super::triangles::TriangleBlock;
 use core::mem::MaybeUninit;
 
-/// The maximum number of rays.
-pub(crate) const RAYS: usize = 64;
-
 /// The maximum number of vectors.
-pub(super) const VECTORS: usize = RAYS / 8;
+pub(super) const VECTORS: usize = 8;
 
 /// The maximum number of rays of a vector.
 pub(super) const LANES: usize = 16;
+
+/// The maximum number of rays.
+pub(crate) const RAYS: usize = VECTORS * LANES;
 
 /// The number of inner children that rays enter untested if they are a node's only ones.
 const FEW: u32 = 2;
@@ -104,12 +104,11 @@ impl<'a, O: Obstacles> Bundle<'a, O> {
     pub(super) unsafe fn trace<K: Instructions>(
         &mut self,
         shape: &impl Shape<K, O>,
-        rays: u64,
+        rays: u128,
         base: *mut Pending,
-    ) -> u64 {
+    ) -> u128 {
         self.alive = 0;
-        let count = RAYS / K::Rays::N;
-        for vector in 0..count {
+        for vector in 0..VECTORS {
             let rays = (rays >> (vector * K::Rays::N)) as u32 & (u32::MAX >> (32 - K::Rays::N));
             self.live[vector] = rays;
             self.alive |= u32::from(rays != 0) << vector;
@@ -120,7 +119,7 @@ impl<'a, O: Obstacles> Bundle<'a, O> {
             // SAFETY: the processor has the instructions, and the stack has room.
             unsafe { self.traverse(shape, root, base) };
         }
-        (0..count).map(|vector| u64::from(self.live[vector]) << (vector * K::Rays::N)).sum()
+        (0..VECTORS).map(|vector| u128::from(self.live[vector]) << (vector * K::Rays::N)).sum()
     }
 
     /// Visits what the rays enter below a child.

@@ -47,7 +47,7 @@ pub(crate) trait Obstacles {
 /// Neighbouring points, and the directions in which they look.
 pub(crate) struct Beams<'a, O: Obstacles> {
     pub(crate) obstacles: &'a O,
-    /// At most 64, at least one.
+    /// At most 128, at least one.
     pub(crate) points: &'a [O::Point],
     /// Only directions above the surface count.
     pub(crate) normals: Option<&'a [O::Point]>,
