@@ -7,6 +7,7 @@ use crate::precision::{Precision, Real, with_precision};
 use bvh_search::bvh_core::MAX_OBJECTS;
 use bvh_search::{Objects, prelude::*};
 use numpy::{Element, PyArray1, PyArray2, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// One number per ray, hit or point.
@@ -67,7 +68,19 @@ pub fn given<'py>(
         tensor if tensor.hasattr("__dlpack__")? => numpy.call_method1("from_dlpack", (tensor,)),
         other => numpy.call_method1("asanyarray", (other,)),
     };
-    given.map_err(|error| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py))))
+    given.map_err(|error| explained(py, error, name, accepted))
+}
+
+/// Returns the error of a conversion, which names the argument if the argument is at fault: Ctrl-C and
+/// an end of memory are not.
+fn explained(py: Python<'_>, error: PyErr, name: &str, accepted: &str) -> PyErr {
+    let of_argument = |error: &PyErr| {
+        error.is_instance_of::<PyValueError>(py) || error.is_instance_of::<PyTypeError>(py)
+    };
+    match of_argument(&error) {
+        true => invalid(format!("{name}: {}; accepted: {accepted}", error.value(py))),
+        false => error,
+    }
 }
 
 /// Converts anything that numpy accepts as an array, and checks its shape. An array that has the
@@ -85,7 +98,7 @@ pub fn numbers<'py, T: Number>(
     // In row order, aligned, and no subclass.
     let array = numpy
         .call_method1("require", (&given, T::DTYPE, "CAE"))
-        .map_err(|error| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py))))?;
+        .map_err(|error| explained(py, error, name, accepted))?;
     let converted: PyReadonlyArrayDyn<T> = array.extract()?;
     assert!(converted.is_c_contiguous(), "numpy converts to row order");
     if accepts(converted.shape()) {

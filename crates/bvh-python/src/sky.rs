@@ -13,7 +13,8 @@ use std::num::NonZeroU32;
 
 /// Returns directions of the sky above the plane of x (east) and y (north), unit vectors `(m, 3)`,
 /// and their weights, `(m,)`: the solid angle of each over π. With `cosine=True`,
-/// `Tracer.visible` then returns sky view factors, 1 for a free horizontal surface.
+/// `Tracer.visible` then returns sky view factors: of a free horizontal surface 1, to 0.6 % with 145
+/// patches.
 ///
 /// `patches` are the middles of the 145 patches of Tregenza, the default, or of the 577, 1297 and so
 /// on, 144 k² + 1, into which Reinhart divides them, in rows from the horizon to the zenith, from

@@ -263,3 +263,24 @@ def test_numbers_beyond_the_exact_range_are_named_with_the_range(number):
 def test_errors_of_precisions_and_selections_name_the_argument(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_what_interrupts_a_conversion_is_no_fault_of_the_argument():
+    class Interrupted:
+        def __init__(self, error):
+            self.error = error
+
+        def __array__(self, *_, **__):
+            raise self.error
+
+    for error in (KeyboardInterrupt, MemoryError):
+        with pytest.raises(error):
+            Tree.from_mesh(Interrupted(error), [[0, 1, 2]], seconds=0)
+    with pytest.raises(ValueError, match="^vertices: "):
+        Tree.from_mesh(Interrupted(TypeError("no")), [[0, 1, 2]], seconds=0)
+
+
+def test_a_scene_is_made_as_open3d_makes_one():
+    scene = RaycastingScene(4, device="CPU:0", seconds=0)
+    scene.add_triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    assert scene.cast_rays([[0.25, 0.25, 2, 0, 0, -1]])["t_hit"] == 2

@@ -54,7 +54,7 @@ class RaycastingScene:
     Answers are `float32`, as those of Open3D.
 
     Ctrl-C ends every query, and `progress(seconds, fraction)` follows it as it does those of `Tracer`.
-    `nthreads` is accepted for compatibility: all threads answer.
+    `nthreads` and `device` are accepted for compatibility: all threads of the processor answer.
 
     >>> from bvh_search import RaycastingScene
     >>> scene = RaycastingScene(seconds=0.1)
@@ -66,7 +66,7 @@ class RaycastingScene:
 
     INVALID_ID = 0xFFFFFFFF
 
-    def __init__(self, seconds: float = 1.0, *, nthreads: int = 0) -> None:
+    def __init__(self, nthreads: int = 0, device: object = None, *, seconds: float = 1.0) -> None:
         self._seconds = seconds
         self._triangles: list[NDArray[Any]] = []
         self._made: tuple[Tracer, NDArray[np.int64]] | None = None
