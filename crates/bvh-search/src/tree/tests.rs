@@ -87,6 +87,10 @@ fn sorting_in_place_gives_the_same_nodes() {
             let (_, mut tree) = scene(n);
             for _ in 0..spare_leaves {
                 tree.push_spare(0);
+                // A subtree out of the tree leaves gaps between the nodes.
+                if let Some(&node) = tree.preorder().get(2) {
+                    tree.detach(node);
+                }
             }
             let unsorted = tree.clone();
             tree.sort_into_spare();
@@ -100,6 +104,22 @@ fn sorting_in_place_gives_the_same_nodes() {
             }
         }
     }
+}
+
+#[test]
+fn a_tree_of_a_million_nodes_is_sorted_like_any_other() {
+    // Level by level, the children of node i are 2i and 2i + 1.
+    let n = 1 << 20;
+    let node = |index: u32| {
+        let below = 2 * index;
+        let children = if below < n { [below, below + 1] } else { [NONE, 0] };
+        Node { parent: index / 2, children, ..Node::ANCHOR }
+    };
+    let root = Node { children: [1, NONE], ..Node::ANCHOR };
+    let nodes = [root].into_iter().chain((1..n).map(node)).collect();
+    let mut tree = Working::from_nodes(nodes, HalfArea::default());
+    tree.sort_in_preorder();
+    assert!(tree.preorder().into_iter().eq(1..n));
 }
 
 #[test]
