@@ -174,5 +174,9 @@ mod tests {
             assert!((recomputed - layout_area(&tree.to_bvh())).abs() <= 1e-12 * recomputed);
         }
         assert!(accepted > 100 && rejected > 1000, "{accepted} {rejected}");
+        // The moves have left the nodes in no order.
+        let followed = layout.cost;
+        layout.fill(&tree);
+        assert_eq!(layout.cost, followed);
     }
 }

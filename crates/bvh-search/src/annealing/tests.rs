@@ -27,6 +27,8 @@ fn greedy(boxes: &[Aabb]) -> Working {
 struct Log {
     movers: AtomicU64,
     moves: Mutex<Vec<(u64, f64, u64)>>,
+    /// The number of every mover that began, and of the nodes near which its moves begin.
+    begun: Mutex<Vec<(u64, usize)>>,
 }
 
 impl Log {
@@ -63,7 +65,9 @@ struct Recorder<'a> {
 }
 
 impl Mover for Recorder<'_> {
-    fn begin(&mut self, _: &Working<impl Metric>, _: Vec<u32>) {}
+    fn begin(&mut self, _: &Working<impl Metric>, near: Vec<u32>) {
+        self.log.begun.lock().unwrap().push((self.number, near.len()));
+    }
     fn step(&mut self, _: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool {
         self.work += 1;
         self.log.moves.lock().unwrap().push((self.number, temperature, rng.random()));
@@ -245,6 +249,9 @@ fn subtrees_share_a_round_out_whole_and_draw_from_streams_of_their_own() {
     assert!(counts.len() > 8 && (5_000..=12_600).contains(&counts[&0]), "{counts:?}");
     assert!(counts.values().all(|work| *work < 25_000), "{counts:?}");
     assert_eq!(log.draws().len(), 100_000);
+    // It begins near the borders of the subtrees, whose own movers begin anywhere in them.
+    let begun = log.begun.into_inner().unwrap();
+    assert!(begun.iter().all(|&(mover, near)| (mover == 0) == (1..3999).contains(&near)));
     let (tally, _) = cool(Quota { work: u64::MAX, moves: 9000 }, 8);
     assert_eq!(tally.moves, 9000);
     let (_, log) = cool(Quota { work: 1000, moves: u64::MAX }, 1);
