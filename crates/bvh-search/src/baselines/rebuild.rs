@@ -271,6 +271,7 @@ fn graft(tree: &mut Working<impl Metric>, subtree: &Subtree, shape: &Working<imp
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::run::{Budget, solve};
     use crate::scatter::{built, scatter};
     use bvh_build::median_cut;
     use bvh_core::validate;
@@ -284,7 +285,11 @@ mod tests {
         let mut kept = 0;
         let begin = tree.area();
         for number in 0..300 {
-            let subtrees = select(&tree, &mut rng, 4, &mut Tally::default());
+            let mut tally = Tally::default();
+            let subtrees = select(&tree, &mut rng, 4, &mut tally);
+            // Every pick looks at the nodes of its tournament and of its subtree.
+            let looks = subtrees.iter().map(|subtree| subtree.inner.len() as u64).sum::<u64>();
+            assert!(tally.moves == 4 && tally.work >= 4 * u64::from(TOURNAMENT) + looks);
             let before = tree.area();
             for subtree in &subtrees {
                 let found =
@@ -306,5 +311,20 @@ mod tests {
         let found = tree.to_bvh();
         validate(&found, &boxes).unwrap();
         assert!(found.is_tight(&boxes));
+    }
+
+    #[test]
+    fn subtrees_are_rebuilt_if_the_work_covers_a_batch_of_them() {
+        // Four subtrees with 64 nodes of work per object, of 200 objects at most.
+        for (objects, least) in [(50, 256), (1000, 52)] {
+            let boxes = scatter(objects);
+            let evaluations = |work_per_object| {
+                let problem = Problem::new(&boxes);
+                let search = Config { work_per_object };
+                solve(&search, &problem, 1, Budget::UNLIMITED, &()).unwrap().evaluations
+            };
+            assert_eq!(evaluations(least - 1), evaluations(0), "{objects}");
+            assert!(evaluations(least) > evaluations(0), "{objects}");
+        }
     }
 }
