@@ -438,6 +438,9 @@ impl Observer for Until<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::run::{Budget, solve};
+    use crate::scatter::{Does, scatter};
+    use crate::tree::HalfArea;
 
     #[test]
     fn a_plan_has_equal_long_runs_and_short_ones_after_those_that_are_long_enough() {
@@ -461,5 +464,36 @@ mod tests {
         let (plan, each) = plan(250_000.0, 1_000_000, 6);
         assert_eq!((plan.len(), each), (21, 250_000.0 / 3.0));
         assert!(plan.is_sorted_by(|a, b| a.until < b.until) && plan[6].until == 1.0 / 3.0);
+    }
+
+    #[test]
+    fn a_run_begins_no_colder_than_it_ends_and_a_later_one_goes_on_from_what_it_has_found() {
+        let boxes = scatter(300);
+        let problem = Problem::new(&boxes);
+        let search = Does(|run: &mut Run| {
+            let (mut best, mut tree) =
+                Incumbent::build(&problem, HalfArea::default(), run).unwrap();
+            let before = tree.area();
+            let mut search = Improvement {
+                config: &Config::default(),
+                boxes: &boxes,
+                seed: 1,
+                n: 300,
+                left: 300_000,
+                by_layout: false,
+                divider: None,
+                best: &mut best,
+                run,
+                is_secured: false,
+            };
+            let schedule = |hot| search.schedule(hot, 300_000, 1.0, 1000.0);
+            assert_eq!([0.0, 0.1].map(|hot| schedule(hot).hot), [COLD, 0.1]);
+            let schedule = schedule(0.02);
+            let later = ScheduledRun { number: 1, schedule, length: 1000.0, is_first: false };
+            search.anneal(&mut tree, &later);
+            assert!(tree.area() < 0.99 * before, "{} {before}", tree.area());
+            best.tree
+        });
+        solve(&search, &problem, 1, Budget::UNLIMITED, &()).unwrap();
     }
 }
