@@ -439,6 +439,9 @@ impl Chosen {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scatter::scatter;
+    use bvh_build::{Builder, muller_fellner};
+    use bvh_core::cost;
 
     #[test]
     fn a_bake_chooses_8000_nodes_per_object_up_to_half_a_million_and_never_less_than_800() {
@@ -485,5 +488,14 @@ mod tests {
                 assert_eq!(*found, Reason::Tried { choice, is_chosen, saved: found_saved });
             }
         }
+    }
+
+    #[test]
+    fn without_rays_the_layout_for_random_lines_judges() {
+        let boxes = scatter(50);
+        let tree = muller_fellner::Config::default().build(&boxes).unwrap();
+        let chosen = Bake::new(&boxes).choose(&Open::default(), None, &()).unwrap();
+        let found = [chosen.tests(&tree), chosen.tests_per_ray(&tree)];
+        assert_eq!(found, [cost::layout_area(&tree); 2]);
     }
 }

@@ -70,6 +70,12 @@ fn objects_are_divided_where_they_are_large_and_oblique_and_not_where_they_are_b
     assert!(choice("escher:3000"));
     // Triangles along the axes fill their boxes.
     assert!(!choice("S04:2000"));
+    // The division that was tried is used, whatever the bake would have permitted.
+    let Scene { primitives, boxes, .. } = &Scene::load("escher:3000").unwrap();
+    let bake = Bake { shapes: Some(primitives), references: 2.0, ..Bake::new(boxes) };
+    let chosen = bake.choose(&BUT_RAYS, None, &()).unwrap();
+    let divided = chosen.bake(&bake).divided.unwrap();
+    assert!(divided.prim_ids.len() as f64 <= Open::REFERENCES * boxes.len() as f64);
 }
 
 #[test]
