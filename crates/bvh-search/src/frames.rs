@@ -528,6 +528,25 @@ mod tests {
     }
 
     #[test]
+    fn the_mean_is_that_of_the_closest_and_counts_all() {
+        let [straight, tilted] = [0.0, 1.0].map(|degrees| turn(DVec3::X, degrees));
+        let (rotation, size) = mean(&[(straight, 3.0), (tilted, 1.0)]);
+        assert!(agreement(rotation, straight) > 1.0 - 1e-12 && size == 4.0, "{rotation} {size}");
+    }
+
+    #[test]
+    fn a_local_search_without_a_start_finds_better_axes_than_the_file_has() {
+        let oblique = turn(DVec3::new(1.0, 2.0, -0.5), 35.0);
+        let at = |corner: [u8; 3]| (oblique * DVec3::from(corner.map(f64::from))).as_vec3();
+        let wall = |y: u8| Triangle([[0, y, 0], [9, y, 0], [9, y, 9]].map(at));
+        let walls: Vec<Triangle> = (0..100).map(wall).collect();
+        let scene = Scene { triangles: &walls, centre: DVec3::ZERO, observer: &() };
+        let found = scene.local_search(vec![], 100);
+        let [found, file] = [found, None].map(|rotation| scene.price(&walls, rotation));
+        assert!(found < 0.8 * file, "{found} {file}");
+    }
+
+    #[test]
     fn the_axes_of_a_surface_are_its_principal_ones() {
         let oblique = turn(DVec3::new(0.3, 1.0, -0.4), 40.0);
         // An ellipsoid of three different radii.

@@ -196,6 +196,8 @@ fn triangles_in_f64_are_baked_at_map_coordinates_and_told_from_others_by_their_f
     let [file, auto, divided] =
         [(Frames::File, Some(1.0)), (Frames::Auto, Some(1.0)), (Frames::Auto, Some(1.3))]
             .map(|(frame, references)| baked(frame, references));
+    let [along, turned] = [&file, &auto].map(|owned| owned.tree().frame.unwrap());
+    assert!(along.centre() == turned.centre() && along.rotation() != turned.rotation());
     let [along, turned] = [&file, &auto].map(|owned| cost::internal_area(owned.tree()));
     assert!(turned < 0.9 * along, "{turned} of {along}");
     assert!(divided.tree().prim_ids.len() > triangles.len());
