@@ -195,9 +195,9 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
         flight.lost++;
         break;
       }
-      // Between the faces of an edge there is no place.
-      const bool is_between = t > 1e-6;
-      if (is_between && flight.steps % look == 0) {
+      // In a short step, rounding may carry a place across a face.
+      const bool is_long = t > 1e-2;
+      if (is_long && flight.steps % look == 0) {
         flight.looked_at++;
         // Not in the middle, where a ray may touch an edge of a smaller volume.
         const Position within = at(point, along, t * (0.1 + 0.8 * unit(random)));
@@ -207,8 +207,7 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
             break;
           }
       }
-      // Nearer to a face, rounding may carry the place across it.
-      if (t > 1e-2 && random() % 4 == 0) {
+      if (is_long && random() % 4 == 0) {
         point = at(point, along, t * (0.01 + 0.98 * unit(random)));
         along = direction(point);
         passed.clear();
