@@ -40,8 +40,10 @@ typedef enum {
     // Either side. A ray in the plane of a triangle never hits it, whatever the orientation.
     BVS_ORIENTATION_ANY = 0,
     // Along the normal, on whose side the corners run counterclockwise: the ray leaves a solid.
+    // Each crossing of the surface counts once, as in `bvs_tracer_all_hits`: a ray that touches an
+    // edge or a corner enters as often as it leaves.
     BVS_ORIENTATION_EXITING = 1,
-    // Against the normal: the ray enters a solid.
+    // Against the normal: the ray enters a solid. Crossings count in the same way.
     BVS_ORIENTATION_ENTERING = 2,
 } BvsOrientation;
 
@@ -249,7 +251,7 @@ typedef struct {
     // The smallest distance, in multiples of a direction's length: 0 or more. A `BvsTracer` rounds
     // both distances to floats.
     double t_min;
-    // The largest distance; it may be infinite.
+    // The largest distance; 0 is no limit.
     double t_max;
     // `columns` doubles for each direction. Null makes every direction weigh 1, in one column.
     const double *weights;
@@ -429,11 +431,12 @@ BvsStatus bvs_tracer_any_hits(const BvsTracer *tracer, const BvsRay *rays, size_
 // `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 BvsStatus bvs_tracer_surface_hits(const BvsTracer *tracer, const BvsRay *rays, size_t count, int32_t coherent, BvsSurfaceHit *hits);
 
-// Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of
-// each ray's hits to `counts`, and the number of all hits to `total`. Hits at the same distance
-// are in the order of their triangles. Each crossing of the surface counts once, although triangles
-// share edges and corners. Only the first `capacity` hits are written; if `total` is greater, call
-// again with room for them.
+// Writes all crossings of `count` rays to `hits`, ray after ray and the nearest first, the number
+// of each ray's hits to `counts`, and the number of all hits to `total`. Hits at the same distance
+// are in the order of their triangles. Each crossing of the surface counts once, although
+// triangles share edges and corners: a ray that touches one counts there as a ray beside it would,
+// which may hit another of these triangles than `bvs_nearest` returns, or none. Only the first
+// `capacity` hits are written; if `total` is greater, call again with room for them.
 //
 // `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to
 // `capacity` elements, and `total` points to a size.

@@ -533,7 +533,10 @@ fn invalid_arguments_are_rejected_by_name() {
             BvsObjects { count: 2, vertex_count: 15, indices: ids.as_ptr(), ..soup(&wrong) };
         for (objects, message) in [
             (BvsObjects { boxes: wrong.as_ptr(), ..indexed }, "several of boxes, vertices and "),
-            (BvsObjects { vertices: null(), ..indexed }, "boxes, vertices and vertices_f64 are null"),
+            (
+                BvsObjects { vertices: null(), ..indexed },
+                "boxes, vertices and vertices_f64 are null",
+            ),
             (indexed, "triangle 1 has vertex 15 of 15, counted from 0"),
             (BvsObjects { vertex_stride: 8, ..indexed }, "vertices has a stride of 8 bytes"),
             (BvsObjects { index_stride: 14, ..indexed }, "indices has a stride of 14 bytes"),

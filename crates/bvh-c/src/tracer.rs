@@ -275,12 +275,12 @@ pub unsafe extern "C" fn bvs_tracer_surface_hits(
     })
 }
 
-/// Writes all crossings of `count` rays to `hits`, ray after ray and the nearest first, the number of
-/// each ray's hits to `counts`, and the number of all hits to `total`. Hits at the same distance
-/// are in the order of their triangles. Each crossing of the surface counts once, although triangles
-/// share edges and corners: a ray that touches one counts there as a ray beside it would, which may
-/// hit another of these triangles than `bvs_nearest` returns, or none. Only the first `capacity` hits are written; if `total` is greater, call
-/// again with room for them.
+/// Writes all crossings of `count` rays to `hits`, ray after ray and the nearest first, the number
+/// of each ray's hits to `counts`, and the number of all hits to `total`. Hits at the same distance
+/// are in the order of their triangles. Each crossing of the surface counts once, although
+/// triangles share edges and corners: a ray that touches one counts there as a ray beside it would,
+/// which may hit another of these triangles than `bvs_nearest` returns, or none. Only the first
+/// `capacity` hits are written; if `total` is greater, call again with room for them.
 ///
 /// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to
 /// `capacity` elements, and `total` points to a size.

@@ -543,7 +543,9 @@ unsafe fn objects_of(objects: &BvsObjects) -> Result<Objects, Failure> {
         return Err(Failure::invalid("several of boxes, vertices and vertices_f64; accepted: one"));
     }
     if count > 0 && given == [false; 3] {
-        return Err(Failure::invalid("boxes, vertices and vertices_f64 are null; accepted: one of them"));
+        return Err(Failure::invalid(
+            "boxes, vertices and vertices_f64 are null; accepted: one of them",
+        ));
     }
     if !boxes.is_null() {
         // SAFETY: an `Aabb` is `repr(C)` with 6 floats, and `boxes` points to that many for each.
