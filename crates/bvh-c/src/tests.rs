@@ -356,6 +356,7 @@ fn points_see_past_a_wall_what_it_does_not_hide() {
         let plain = BvsSky { weights: null(), ..sky };
         for (sky, has_normals, free, sums) in [
             (sky, false, [0b110, 0b111], [6.0, 7.0]),
+            (BvsSky { t_max: 0.0, ..sky }, false, [0b110, 0b111], [6.0, 7.0]),
             (sky, true, [0b010, 0b011], [2.0, 3.0]),
             (cosine, true, [0b010, 0b011], [1.6, 2.2]),
             (BvsSky { t_max: 0.5, ..sky }, false, [0b111; 2], [7.0; 2]),
