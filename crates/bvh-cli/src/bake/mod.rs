@@ -15,6 +15,7 @@ use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::{Precision, Scene};
+use bvh_core::file::Header;
 use bvh_search::{
     Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
 };
@@ -56,7 +57,7 @@ pub struct BakeArgs {
     pub rays: Option<String>,
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
     /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the
-    /// default is `layout` with --rays, and `area` otherwise.
+    /// default is `layout` with --rays, and `area` otherwise; with --from, that of the tree.
     #[arg(long, value_name = "area|layout")]
     #[arg(value_parser = named([("area", Objective::InternalArea), ("layout", Objective::Layout)]))]
     pub cost: Option<Objective>,
@@ -85,7 +86,8 @@ pub struct BakeArgs {
     #[arg(long, value_name = "NAME", default_value = BEST)]
     #[arg(value_parser = named(Method::all().into_iter().map(|method| (method.name(), method))))]
     pub method: Method,
-    /// Continue from the tree of an earlier bake of the same scene; the result is never worse.
+    /// Continue from the tree of an earlier bake of the same scene; the result never costs more.
+    /// Without --rays, a tree for rays is continued for the default ones.
     #[arg(long, value_name = "FILE.bvh")]
     pub from: Option<PathBuf>,
     /// Cut the scene by space into N parts, bake each into the folder `FILE.parts`, and join their
@@ -127,7 +129,7 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     if let Some(rays) = &plan.rays {
         rays.check(&scene)?;
     }
-    let start = args.start(&scene, &mut plan)?;
+    let start = args.start(&scene, &mut plan, answer)?;
     let start = start.as_ref();
     hold();
     let scene = args.turned(&plan, scene, start, &watch, answer);
@@ -312,10 +314,17 @@ impl BakeArgs {
         }
     }
 
-    /// Loads the tree of `--from`, whose references the plan then permits.
-    fn start(&self, scene: &Scene, plan: &mut Plan) -> Result<Option<Start>, Error> {
+    /// Loads the tree of `--from`, whose references the plan then permits, and whose cost and rays
+    /// it takes over.
+    fn start(
+        &self,
+        scene: &Scene,
+        plan: &mut Plan,
+        answer: &mut Answer,
+    ) -> Result<Option<Start>, Error> {
         let Some(from) = &self.from else { return Ok(None) };
-        let start = Start::load(from, scene)?;
+        let (start, header) = Start::load(from, scene)?;
+        self.take_over(&header, plan, answer);
         let [objects, references] = [scene.boxes.len(), start.tree.prim_ids.len()];
         if references <= objects.max((plan.references * objects as f64) as usize) {
             return Ok(Some(start));
@@ -350,6 +359,26 @@ impl BakeArgs {
         let frames = if is_free { self.frame.unwrap_or_default() } else { Frames::File };
         let budget = plan.budget(scene.boxes.len());
         let Some(choice) = Choice::of_shapes(&scene.primitives, frames, budget, watch) else {
+    /// Continues what the bake of a tree minimised, where the arguments say nothing else.
+    fn take_over(&self, header: &Header, plan: &mut Plan, answer: &mut Answer) {
+        let own = header.objective;
+        let is_open = self.tracer.is_none() && self.rays.is_none();
+        // Trees of other programs may be for other costs.
+        let is_ours = [Objective::InternalArea, Objective::Layout].contains(&own);
+        if !(is_open && is_ours && self.cost.is_none_or(|cost| cost == own)) {
+            return;
+        }
+        plan.objective = Some(own);
+        if own == Objective::Layout && self.cost.is_none() {
+            answer.line("choices", "cost: the wide layout's, as of the tree of --from".into());
+        }
+        if header.has_visits {
+            plan.rays = Some(Rays::Default);
+            let why = "rays: default, because the tree of --from is for rays; for others, --rays";
+            answer.line("choices", why.into());
+        }
+    }
+
             return scene;
         };
         if frames == Frames::Auto {

@@ -53,8 +53,9 @@ pub struct Start {
 }
 
 impl Start {
-    /// Reads the tree of `--from` over the scene. Rejects a tree with nodes that no search moves.
-    pub fn load(from: &Path, scene: &Scene) -> Result<Self, Error> {
+    /// Reads the tree of `--from` over the scene, and its header. Rejects a tree with nodes that no
+    /// search moves.
+    pub fn load(from: &Path, scene: &Scene) -> Result<(Self, Header), Error> {
         let (tree, header) = tree_file::load(from, scene)?;
         let is_wide = |node: &Node| !node.is_leaf() && node.children().len() != 2;
         if let Some(wide) = tree.nodes.iter().position(is_wide) {
@@ -64,7 +65,7 @@ impl Start {
                 tree.nodes[wide].children().len()
             )));
         }
-        Ok(Self { tree, work: header.work })
+        Ok((Self { tree, work: header.work }, header))
     }
 }
 

@@ -146,6 +146,44 @@ fn a_bake_gives_the_greedy_tree_or_the_tree_it_starts_from_without_a_budget_and_
 }
 
 #[test]
+fn a_later_bake_continues_for_the_cost_and_the_rays_of_its_tree_where_none_are_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let bake = |out: &str, more: &str| facts(at, &format!("bake escher:400 --out={out} {more}"));
+    let number =
+        |facts: &serde_json::Map<_, serde_json::Value>, name| facts[name].as_f64().unwrap();
+    for (first, method, objective, choices) in [
+        ("--cost=layout", "best", "cost of the wide layout", 1),
+        ("--rays=default", "best for rays", "cost of the wide layout", 2),
+        ("--rays=default --cost=area", "best for rays", "internal area", 1),
+        ("", "best", "internal area", 0),
+    ] {
+        let first = bake("a.bvh", &format!("--budget=300kwork {first}"));
+        for budget in ["0s", "1work", "2Mwork", "1s"] {
+            let later = bake("b.bvh", &format!("--budget={budget} --from=a.bvh"));
+            assert!(number(&later, "minimised_cost") <= number(&later, "minimised_cost_of_start"));
+            if !budget.ends_with('s') {
+                let [before, same] =
+                    [("minimised_cost", &first), ("minimised_cost_of_start", &later)]
+                        .map(|(name, facts)| number(facts, name));
+                assert!((before - same).abs() < 1e-9 * before, "{budget}: {before} {same}");
+                let found = later.get("choices").map_or(0, |list| list.as_array().unwrap().len());
+                assert_eq!(found, choices, "{later:?}");
+            }
+            let inspected = facts(at, "inspect b.bvh");
+            assert_eq!(
+                (&inspected["method"], &inspected["objective"]),
+                (&method.into(), &objective.into())
+            );
+        }
+    }
+    // What is given counts.
+    bake("a.bvh", "--budget=1kwork --rays=default");
+    bake("b.bvh", "--budget=1kwork --from=a.bvh --cost=area");
+    assert_eq!(facts(at, "inspect b.bvh")["method"], "best");
+}
+
+#[test]
 fn a_bake_divides_objects_where_it_pays_and_minimises_the_cost_of_the_layout() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
