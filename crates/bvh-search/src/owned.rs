@@ -1,6 +1,7 @@
 //! A tree that owns its objects, for callers that cannot lend them: the bindings to other
 //! languages.
 
+use crate::bake::Untimed;
 use crate::{
     Bake, BakeError, Baked, Budget, Choice, Division, Frames, MadeDensity, Observer, Open, Reason,
     SearchError, parallel, ray_density,
@@ -104,7 +105,8 @@ impl OwnedTree {
         };
         let mut owned = Self::bare(objects, choice.and_then(|choice| choice.frame));
         (owned.references, owned.seed) = (references.unwrap_or(1.0), seed);
-        owned.reasons.extend(choice.map(Reason::Frame));
+        let is_open_frame = frame == Frames::Auto && !Untimed(observer).cancelled();
+        owned.reasons.extend(choice.filter(|_| is_open_frame).map(Reason::Frame));
         let shapes = owned.shapes.as_ref();
         let recorded =
             |tree: &Bvh, _, is_over: &dyn Fn() -> bool| ray_density(tree, shapes, rays, is_over);

@@ -381,7 +381,7 @@ impl BakeArgs {
 
             return scene;
         };
-        if frames == Frames::Auto {
+        if frames == Frames::Auto && !is_interrupted() {
             watch.bar.suspend(|| answer.say(&Reason::Frame(choice).to_string()));
         }
         if self.explain && choice.agreeing > 0.0 {

@@ -112,8 +112,8 @@ impl Plan {
         hold();
         let failed = |error| Error::search(&scene.name, self.method.name())(error);
         let bake = Bake { start: start.map(|start| &start.tree), ..self.bake(scene) };
-        // Without time, the greedy tree is the answer.
-        let greedy = bake.greedy(&INTERRUPTED).map_err(failed)?;
+        // Without time, and after an interruption, the greedy tree is the answer.
+        let greedy = bake.greedy(&()).map_err(failed)?;
         let rays = self.rays.as_ref();
         let made = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
             rays.unwrap_or(&Rays::Default).density(scene, tree, seed, is_over)
