@@ -137,7 +137,7 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
         explain(&scene, answer)?;
     }
     let anywhere = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
-        Rays::Default.density(&scene, tree, seed, is_over)
+        Rays::Default.density(&scene, tree, 1, seed, is_over)
     };
     let open = args.open(&anywhere);
     // Reserving the file first reports a full disk before the search and not after it.

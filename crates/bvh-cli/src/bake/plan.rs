@@ -19,6 +19,10 @@ use bvh_search::{
 };
 use glam::DMat3;
 use std::path::Path;
+use std::sync::OnceLock;
+
+/// What is left of a budget of time, over the time for the rays.
+const SHARE: u32 = 4;
 
 /// A search for the best tree of any scene.
 #[derive(Clone, Debug)]
@@ -115,8 +119,16 @@ impl Plan {
         // Without time, and after an interruption, the greedy tree is the answer.
         let greedy = bake.greedy(&()).map_err(failed)?;
         let rays = self.rays.as_ref();
+        let step = OnceLock::new();
         let made = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
-            rays.unwrap_or(&Rays::Default).density(scene, tree, seed, is_over)
+            let rays = rays.unwrap_or(&Rays::Default);
+            // By fewer rays than the start is for, the result could be worse for all.
+            let left = watch.left().filter(|_| start.is_none());
+            let within = |time| rays.step_within(scene, tree, time, is_over);
+            let step = *step.get_or_init(|| left.map_or(1, |left| within(left / SHARE)));
+            // So few may miss the scene.
+            let some = rays.density(scene, tree, step, seed, is_over);
+            some.or_else(|_| rays.density(scene, tree, 1, seed, is_over))
         };
         let rays: Option<MadeRays> = if rays.is_some() { Some(&made) } else { None };
         let untimed: &dyn Observer = if open.budget { &watch } else { &INTERRUPTED };
@@ -126,8 +138,14 @@ impl Plan {
             BakeError::Search(error) => failed(error),
             BakeError::Rays(source) => traced(source),
         })?;
-        let explain = |reason: &Reason| answer.line("choices", reason.to_string());
-        watch.bar.suspend(|| chosen.reasons.iter().for_each(explain));
+        watch.bar.suspend(|| {
+            if let Some(step @ 2..) = step.get() {
+                let why = format!("rays: one in {step}, because more would take too much time");
+                answer.line("choices", why);
+            }
+            let explain = |reason: &Reason| answer.line("choices", reason.to_string());
+            chosen.reasons.iter().for_each(explain);
+        });
         let greedy = chosen.greedy.take();
         let plain = match &greedy {
             Some(_) if is_turned(scene) && !is_interrupted() => Some(arguments::greedy(scene)?),

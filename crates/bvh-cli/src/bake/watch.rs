@@ -43,6 +43,14 @@ impl Watch {
         Self { effort: work.map(Effort::Work).or(self.effort), ..self }
     }
 
+    /// The time left of a budget of time.
+    pub fn left(&self) -> Option<Duration> {
+        match self.effort {
+            Some(Effort::Time(limit)) => Some(limit.saturating_sub(self.deadline.elapsed())),
+            Some(Effort::Work(_)) | None => None,
+        }
+    }
+
     fn line(&self, elapsed: Duration) -> String {
         let percent = 100.0 * self.bar.position() as f64 / LENGTH;
         let seconds = elapsed.as_secs();

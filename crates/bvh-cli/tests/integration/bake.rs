@@ -280,6 +280,11 @@ fn the_printed_seconds_and_a_budget_of_time_are_the_whole_wait() {
         let waited = start.elapsed().as_secs_f64();
         assert!((0.5 * waited..waited).contains(&seconds), "{budget}: {seconds} of {waited}");
     }
+    // To make all of these rays takes longer than the budget.
+    fs::write(at.join("walk.toml"), WALK.replace("5000", "250000")).unwrap();
+    let found = facts(at, "bake escher:500 --budget=2s --rays=walk.toml --out=x.bvh");
+    assert!(found["work"].as_u64() > Some(0), "{found:?}");
+    assert!(found["choices"][0].as_str().unwrap().starts_with("rays: one in "), "{found:?}");
 }
 
 #[test]
