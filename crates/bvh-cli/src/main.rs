@@ -114,30 +114,41 @@ fn run(Cli { command, json, jobs }: Cli) -> Result<(), Error> {
             .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))?;
     }
     let mut answer = Answer::new(json);
+    let done = answered_by(command, &mut answer);
+    match &done {
+        Ok(()) => answer.end(),
+        Err(Error::Interrupted(left)) => {
+            answer.record("interrupted", left.as_str());
+            answer.end();
+        }
+        Err(_) => {}
+    }
+    done
+}
+
+fn answered_by(command: Command, answer: &mut Answer) -> Result<(), Error> {
     match command {
         Command::Bake(args) => match args.parts {
-            Some(count) => bake::parts::bake(&args, count, &mut answer)?,
-            None => bake::bake(&args, &mut answer)?,
+            Some(count) => bake::parts::bake(&args, count, answer)?,
+            None => bake::bake(&args, answer)?,
         },
-        Command::Bench(args) => bench::bench(&args, &mut answer)?,
-        Command::Inspect(args) => inspect::inspect(&args, &mut answer)?,
+        Command::Bench(args) => bench::bench(&args, answer)?,
+        Command::Inspect(args) => inspect::inspect(&args, answer)?,
         Command::Verify { file, scene } => {
             let args = InspectArgs { file, scene: Some(scene), rays: None, nodes: None };
-            inspect::inspect(&args, &mut answer)?;
+            inspect::inspect(&args, answer)?;
         }
-        Command::Export(args) => export::export(&args, &mut answer)?,
-        Command::Orient(args) => orient::orient(&args, &mut answer)?,
-        Command::Render(args) => render::render(&args, &mut answer)?,
-        Command::Report(args) => report::report(&args, &mut answer)?,
-        Command::Sky(args) => sky::sky(&args, &mut answer)?,
-        Command::Scenes => scenes::scenes(&mut answer)?,
+        Command::Export(args) => export::export(&args, answer)?,
+        Command::Orient(args) => orient::orient(&args, answer)?,
+        Command::Render(args) => render::render(&args, answer)?,
+        Command::Report(args) => report::report(&args, answer)?,
+        Command::Sky(args) => sky::sky(&args, answer)?,
+        Command::Scenes => scenes::scenes(answer)?,
         Command::Completions { shell } => {
             let mut file = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "bvh", &mut file);
             print_bytes(&file);
-            return Ok(());
         }
     }
-    answer.end();
     Ok(())
 }

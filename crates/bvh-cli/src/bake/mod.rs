@@ -170,19 +170,32 @@ fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> R
         )));
     }
     let bytes = found.save(out, reserved)?;
-    if is_interrupted() {
-        let (out, next) = (out.display(), continues(out));
-        return Err(Error::Interrupted(format!("the best tree so far is in {out}; {next}")));
-    }
     summarise(found, answer);
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
     answer.record("file", out.display().to_string());
     answer.record("bytes", bytes);
     Ok(())
 }
+    if is_interrupted() {
+        let (tree, out, next) = (so_far(found), out.display(), continues(out));
+        return Err(Error::Interrupted(format!("{out} has {tree}; {next}")));
+    }
 
 /// Says how to go on after an interruption. The file takes the default name of the next bake.
 fn continues(out: &Path) -> String {
+/// Says what an interrupted search has found.
+fn so_far(found: &Found) -> String {
+    let cost = found.baked.outcome.cost;
+    match found.baked.greedy_cost {
+        Some(base) if cost < base => {
+            let (gain, unit) = (gain(cost, base), found.unit().unwrap_or("area of inner nodes"));
+            format!("the best tree so far, {gain} {unit} against the greedy tree")
+        }
+        Some(_) => "the greedy tree, because nothing better was found yet".into(),
+        None => "the best tree so far".into(),
+    }
+}
+
     format!("`--from {0} --out {0}` continues, `--out {0}` begins again", out.display())
 }
 

@@ -1,9 +1,16 @@
 //! Ctrl-C while `bvh bake` searches: the best tree so far is written, and it is a good one. Other
 //! commands end at once.
-use crate::support::{begin, bvh, cost, ended, names, number, send, wait_until, words};
+use crate::support::{
+    begin, bvh, cost, ended, names, number, obj, program, send, text, wait_until, words,
+};
+use bvh_core::Triangle;
+use bvh_scenes::Scene;
+use glam::DMat3;
+use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 /// Bakes a scene into `a.bvh`, and interrupts the search this long after it has begun.
@@ -49,6 +56,49 @@ fn ctrl_c_keeps_a_better_tree_in_the_file_and_the_best_one_of_a_decision() {
     send("-INT", &child);
     ended(&child.wait_with_output().unwrap(), 130, &[]);
     assert!(number(at, "inspect a.bvh konistil", "work") > 1e6);
+}
+
+#[test]
+fn ctrl_c_says_what_was_gained_and_also_while_the_frame_is_chosen_keeps_no_worse_tree_than_greedy()
+{
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = Scene::load("escher").unwrap();
+    let turn = DMat3::from_rotation_y(0.5);
+    let turned = |triangle: &Triangle| triangle.0.map(|corner| turn * corner.as_dvec3());
+    let mesh = obj(scene.triangles().unwrap().iter().map(turned));
+    // The remark on the last triangle tells that the choice soon begins.
+    fs::write(at.join("turned.obj"), mesh + "f 1 1 1\n").unwrap();
+    let bake = |after: Duration, more: &str| {
+        let args = format!("bake turned.obj --budget=1h --out=a.bvh {more}");
+        let mut command = program(at, &words(&args));
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut messages = BufReader::new(child.stderr.take().unwrap());
+        let mut message = String::new();
+        messages.read_line(&mut message).unwrap();
+        std::thread::sleep(after);
+        send("-INT", &child);
+        messages.read_to_string(&mut message).unwrap();
+        (text(&child.wait_with_output().unwrap().stdout), message)
+    };
+    let mut after = Duration::from_millis(10);
+    let (said, message) = loop {
+        let found = bake(after, "");
+        if at.join("a.bvh").exists() {
+            break found;
+        }
+        after *= 2;
+    };
+    assert!(!said.contains("budget is too small"), "{said}");
+    assert!(message.contains("nothing better was found yet; `--from a.bvh"), "{message}");
+    assert!(number(at, "verify a.bvh turned.obj", "saved") >= 0.0);
+    fs::remove_file(at.join("a.bvh")).unwrap();
+    let (said, message) = bake(Duration::from_secs(10), "--frame=file --json");
+    let facts: Value = serde_json::from_str(&said).unwrap();
+    let saved = facts["saved"].as_f64().unwrap();
+    assert!(saved > 0.0 && message.contains(facts["interrupted"].as_str().unwrap()), "{said}");
+    let gain = format!("−{:.1} % area of inner nodes against the greedy tree", 100.0 * saved);
+    assert!(message.contains(&gain), "{gain}: {message}");
 }
 
 #[test]
