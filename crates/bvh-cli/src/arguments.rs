@@ -85,11 +85,25 @@ pub fn output_or_free(
     let path = derived();
     if path.exists() {
         return Err(Error::Usage(format!(
-            "{0} exists; accepted: --out {0} to replace it, or the name of a new file",
-            path.display()
+            "{} exists; accepted: --out {} to replace it, or the name of a new file",
+            path.display(),
+            quoted(&path.to_string_lossy())
         )));
     }
     Ok(path)
+}
+
+/// Returns a name as a shell and the parser read it: in quotes if need be, and no flag.
+pub fn quoted(name: &str) -> String {
+    let name = if name.starts_with('-') { format!("./{name}") } else { name.into() };
+    let separator = std::path::MAIN_SEPARATOR;
+    if name.chars().all(|c| c.is_alphanumeric() || c == separator || "_-./:,+=@%".contains(c)) {
+        name
+    } else if cfg!(windows) {
+        format!("\"{name}\"")
+    } else {
+        format!("'{}'", name.replace('\'', r"'\''"))
+    }
 }
 
 pub fn input_file(flag: &str, path: &Path) -> Result<(), Error> {

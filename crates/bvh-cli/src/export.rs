@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::answer::{Answer, gain, whole};
-use crate::arguments::{greedy, named, output_file, scene_of};
+use crate::arguments::{greedy, named, output_file, quoted, scene_of};
 use bvh_core::cost::Objective;
 use bvh_core::export::{ExportError, Layout, Target};
 use bvh_scenes::{files, tree_file};
@@ -52,7 +52,7 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     // Only triangles in f32 can be traced there.
     let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
     let (tree, header) = tree_file::load(&args.file, &scene)?;
-    let bake_for = format!("`bvh bake {} --for {}`", args.scene, target.name);
+    let bake_for = format!("`bvh bake {} --for {}`", quoted(&args.scene), target.name);
     let objects = scene.boxes.len();
     target.check(&tree, objects, args.divided).map_err(|error| {
         let flags = match error {

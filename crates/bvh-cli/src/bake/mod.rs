@@ -7,15 +7,17 @@ mod watch;
 
 use crate::Error;
 use crate::answer::{Answer, frame_facts, gain, saved, whole};
-use crate::arguments::{input_file, load_scene, named, output_file, output_or_free, precision_of};
+use crate::arguments::{
+    input_file, load_scene, named, output_file, output_or_free, precision_of, quoted,
+};
 use crate::interrupt::{hold, is_interrupted};
 use crate::rays::Rays;
 use bvh_core::Aabb;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
+use bvh_core::file::Header;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::{Precision, Scene};
-use bvh_core::file::Header;
 use bvh_search::{
     Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
 };
@@ -174,15 +176,13 @@ fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> R
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
     answer.record("file", out.display().to_string());
     answer.record("bytes", bytes);
-    Ok(())
-}
     if is_interrupted() {
         let (tree, out, next) = (so_far(found), out.display(), continues(out));
         return Err(Error::Interrupted(format!("{out} has {tree}; {next}")));
     }
+    Ok(())
+}
 
-/// Says how to go on after an interruption. The file takes the default name of the next bake.
-fn continues(out: &Path) -> String {
 /// Says what an interrupted search has found.
 fn so_far(found: &Found) -> String {
     let cost = found.baked.outcome.cost;
@@ -196,7 +196,10 @@ fn so_far(found: &Found) -> String {
     }
 }
 
-    format!("`--from {0} --out {0}` continues, `--out {0}` begins again", out.display())
+/// Says how to go on after an interruption. The file takes the default name of the next bake.
+fn continues(out: &Path) -> String {
+    let out = quoted(&out.to_string_lossy());
+    format!("`--from {out} --out {out}` continues, `--out {out}` begins again")
 }
 
 fn summarise(found: &Found, answer: &mut Answer) {
@@ -277,7 +280,7 @@ fn summarise(found: &Found, answer: &mut Answer) {
 }
 
 fn next(args: &BakeArgs, found: &Found, out: &Path, answer: &Answer) {
-    let (out, scene) = (out.display(), &args.scene);
+    let [out, scene] = [&out.to_string_lossy(), &args.scene[..]].map(quoted);
     let tracer = args.tracer.map_or("TRACER", |target| target.name);
     let mut commands = format!("`bvh report {out} {scene}`");
     if found.scene.has_triangles() {
@@ -356,22 +359,6 @@ impl BakeArgs {
         Ok(Some(start))
     }
 
-    /// Returns the scene in the frame of its bake, and says why it is the best one.
-    fn turned(
-        &self,
-        plan: &Plan,
-        scene: Scene,
-        start: Option<&Start>,
-        watch: &Watch,
-        answer: &mut Answer,
-    ) -> Scene {
-        if let Some(Start { tree, .. }) = start {
-            return scene.in_frame(tree.frame);
-        }
-        let is_free = matches!(plan.method, Method::Best(_)) && self.tracer.is_none();
-        let frames = if is_free { self.frame.unwrap_or_default() } else { Frames::File };
-        let budget = plan.budget(scene.boxes.len());
-        let Some(choice) = Choice::of_shapes(&scene.primitives, frames, budget, watch) else {
     /// Continues what the bake of a tree minimised, where the arguments say nothing else.
     fn take_over(&self, header: &Header, plan: &mut Plan, answer: &mut Answer) {
         let own = header.objective;
@@ -392,6 +379,22 @@ impl BakeArgs {
         }
     }
 
+    /// Returns the scene in the frame of its bake, and says why it is the best one.
+    fn turned(
+        &self,
+        plan: &Plan,
+        scene: Scene,
+        start: Option<&Start>,
+        watch: &Watch,
+        answer: &mut Answer,
+    ) -> Scene {
+        if let Some(Start { tree, .. }) = start {
+            return scene.in_frame(tree.frame);
+        }
+        let is_free = matches!(plan.method, Method::Best(_)) && self.tracer.is_none();
+        let frames = if is_free { self.frame.unwrap_or_default() } else { Frames::File };
+        let budget = plan.budget(scene.boxes.len());
+        let Some(choice) = Choice::of_shapes(&scene.primitives, frames, budget, watch) else {
             return scene;
         };
         if frames == Frames::Auto && !is_interrupted() {

@@ -3,7 +3,9 @@
 // Tests that make pipes or lose output are left out on Windows, and their imports stay.
 #![cfg_attr(windows, allow(unused_imports))]
 
-use crate::support::{bvh, facts, names, program, said, unsaid, words, wrong, wrong_flags};
+use crate::support::{
+    PROGRAM, bvh, facts, names, program, said, text, unsaid, words, wrong, wrong_flags,
+};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -28,6 +30,39 @@ fn the_steps_that_a_scene_does_not_need_are_listed() {
         let json = facts(folder.path(), &bake);
         assert!(json["explanation"][0].as_str().unwrap().contains(objects), "{json:?}");
         assert!(json["explanation"][1].as_str().unwrap().contains(skipped), "{json:?}");
+    }
+}
+
+#[test]
+fn the_commands_that_follow_a_bake_run_in_a_shell_for_any_names() {
+    if cfg!(windows) {
+        eprintln!("not tried: this system has no such shell");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, scene) in [
+        ("a friend's $HOME `scene`", "a friend's $HOME `scene`.obj"),
+        ("-v", "./-v.obj"),
+        ("plain-1_é", "plain-1_é.obj"),
+    ] {
+        fs::write(at.join(scene), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let said = said(at, &["bake", scene, "--budget=0s"]);
+        let next = said.split_once("next: `bvh bench ").unwrap().1;
+        let [bench, report] = next.split("`, `bvh ").take(2).collect::<Vec<_>>()[..] else {
+            panic!("{said}")
+        };
+        assert_eq!(bench.contains('\''), name.contains(' '), "{bench}");
+        for command in [&format!("bench {bench} --time=1ms"), report] {
+            let mut shell = Command::new("sh");
+            let output = shell.args(["-c", &format!("'{PROGRAM}' {command}")]).current_dir(at);
+            let output = output.output().unwrap();
+            assert!(output.status.success(), "{command}: {}", text(&output.stderr));
+        }
+        assert!(
+            at.join(name).with_extension("html").exists()
+                && at.join(format!("{name}.bvh")).exists()
+        );
     }
 }
 

@@ -9,7 +9,7 @@ pub use program::*;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_bvh");
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_bvh");
 
 pub fn words(line: &str) -> Vec<&str> {
     line.split_whitespace().collect()
