@@ -1,6 +1,6 @@
 //! The shortcuts that a scene allows, decided from its boxes before the search.
 
-use crate::{Shortcut, exact, lower_bound};
+use crate::{Shortcut, exact};
 use bvh_build::{BuildError, Presorted};
 use bvh_core::Aabb;
 
@@ -47,9 +47,5 @@ pub fn of(boxes: &[Aabb]) -> Result<Vec<(Shortcut, String)>, BuildError> {
         let why = format!("the search `best` with {work} nodes of work: the optimum takes no more");
         shortcuts.push((Shortcut::Tiny, why));
     }
-    let bound = lower_bound::of_largest(boxes);
-    let why =
-        format!("the rest of a local search at an internal area of {bound}: no tree has less");
-    shortcuts.push((Shortcut::BoundMet, why));
     Ok(shortcuts)
 }

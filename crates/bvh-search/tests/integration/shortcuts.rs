@@ -84,9 +84,8 @@ fn the_shortcuts_of_a_scene_are_known_before_the_search() {
         found.into_iter().map(|(shortcut, _)| shortcut).collect()
     }
     assert_eq!(shortcuts(&scatter(1, 1)), []);
-    assert_eq!(shortcuts(&scatter(500, 1)), [Shortcut::BoundMet]);
-    assert_eq!(shortcuts(&scatter(12, 1)), [Shortcut::Tiny, Shortcut::BoundMet]);
-    assert!(shortcuts(&scatter(2, 1)).contains(&Shortcut::BoundMet));
+    assert_eq!(shortcuts(&scatter(500, 1)), []);
+    assert_eq!(shortcuts(&scatter(12, 1)), [Shortcut::Tiny]);
     let line = &stiff(50)[3];
-    assert_eq!(shortcuts(line), [Shortcut::Flat, Shortcut::BoundMet]);
+    assert_eq!(shortcuts(line), [Shortcut::Flat]);
 }
