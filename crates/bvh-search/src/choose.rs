@@ -6,7 +6,8 @@
 //! worth.
 
 use crate::bake::Untimed;
-use crate::reason::{More, Reason, Tried};
+use crate::exact::most_work_of_tiny;
+use crate::reason::{More, Reason, Tried, saved};
 use crate::{Bake, BakeError, Baked, Budget, Observer, SearchError, parallel};
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, DensityError, Primitives, RayDensity};
@@ -149,6 +150,12 @@ impl Chosen {
     }
 }
 
+/// Returns whether a bake that chooses its own budget needs no search for so few objects.
+fn has_optimum(objects: usize) -> bool {
+    let work = Budget::of_objects(objects).max_work;
+    objects < 3 || most_work_of_tiny(objects).is_some_and(|least| Some(least) <= work)
+}
+
 fn per_ray(tree: &Bvh, density: Option<&RayDensity>) -> f64 {
     let Some(density) = density else { return Objective::Layout.cost(tree) };
     let root = density.measure(&tree.root_aabb().unwrap_or(Aabb::EMPTY));
@@ -249,7 +256,7 @@ impl<'a> Bake<'a> {
     fn combinations(&self, open: &Open, objective: Objective) -> Vec<Combination> {
         let is_triangles = matches!(self.shapes, Some(Primitives::Triangles(_)));
         let has_choices = self.method.is_none() && self.start.is_none() && is_triangles;
-        if !(has_choices && open.budget) || self.boxes.is_empty() {
+        if !(has_choices && open.budget) || has_optimum(self.boxes.len()) {
             return Vec::new();
         }
         let mut costs = vec![(objective, open.rays.is_some())];
@@ -327,7 +334,7 @@ impl<'a> Bake<'a> {
         let place = tests.iter().position(|&tests| tests <= best * (1.0 + TOLERANCE)).unwrap_or(0);
         chosen.explain(open, &tests, place);
         chosen.settle(combinations[place], divided.filter(|_| parts.is_empty()));
-        Ok(Some(1.0 - tests[place] / of_greedy))
+        Ok(Some(saved(tests[place], of_greedy)))
     }
 
     fn trial(
@@ -424,7 +431,7 @@ impl Chosen {
         let row = place - column;
         let mut tried = |choice, is_open, is_chosen, with: usize, without: usize| {
             if is_open {
-                let saved = 1.0 - tests[with] / tests[without];
+                let saved = saved(tests[with], tests[without]);
                 self.reasons.push(Reason::Tried { choice, is_chosen, saved });
             }
         };

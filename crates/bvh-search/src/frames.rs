@@ -11,6 +11,7 @@
 //! searches over a sample that says more decide.
 
 use crate::parallel;
+use crate::reason::saved;
 use crate::run::stream;
 use crate::{Bake, Budget, Observer, Stream};
 use bvh_build::{Builder, muller_fellner};
@@ -234,7 +235,7 @@ impl Scene<'_> {
                 best = index;
             }
         }
-        let gain = 1.0 - areas[best] / areas[0];
+        let gain = saved(areas[best], areas[0]);
         let choice = Choice { frame: frames[best], gain, agreeing, sufficed: true };
         Some(if self.observer.cancelled() { Choice { agreeing, ..Choice::FILE } } else { choice })
     }

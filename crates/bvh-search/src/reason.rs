@@ -2,6 +2,7 @@
 
 use crate::Choice;
 use bvh_core::Frame;
+use bvh_core::glam::DMat3;
 use core::fmt;
 
 /// A choice of a bake, and why. It is shown as one line.
@@ -58,11 +59,14 @@ impl fmt::Display for Reason {
             Self::Frame(Choice { sufficed: false, .. }) => f.write_str(
                 "frame: the budget is too small to try others; kept are the file's axes",
             ),
-            Self::Frame(Choice { frame: None, .. }) => {
+            // Triangles in f64 have a frame for its centre, too.
+            Self::Frame(Choice { frame, .. })
+                if frame.is_none_or(|frame| frame.rotation() == DMat3::IDENTITY) =>
+            {
                 f.write_str("frame: no other saves enough area; kept are the file's axes")
             }
-            Self::Frame(Choice { frame: Some(frame), gain, .. }) => {
-                let degrees = angle(frame).to_degrees();
+            Self::Frame(Choice { frame, gain, .. }) => {
+                let degrees = frame.as_ref().map_or(0.0, angle).to_degrees();
                 let percent = 100.0 * gain;
                 write!(
                     f,
@@ -103,6 +107,11 @@ impl fmt::Display for Reason {
     }
 }
 
+/// Returns the fraction by which a cost is below another one; 0 below a cost of 0.
+pub(crate) fn saved(cost: f64, base: f64) -> f64 {
+    if base > 0.0 { 1.0 - cost / base } else { 0.0 }
+}
+
 /// Returns the angle of the frame's rotation.
 fn angle(frame: &Frame) -> f64 {
     let rotation = frame.rotation();
@@ -113,13 +122,15 @@ fn angle(frame: &Frame) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_core::glam::{DMat3, DVec3};
+    use bvh_core::glam::DVec3;
 
     #[test]
     fn reasons_are_lines() {
         let tried = |choice, is_chosen, saved| Reason::Tried { choice, is_chosen, saved };
         let frame = Frame::new(DMat3::from_rotation_y(0.5), DVec3::ZERO).ok();
         let turned = Choice { frame, gain: 0.25, agreeing: 0.5, sufficed: true };
+        let frame = Frame::new(DMat3::IDENTITY, DVec3::ONE).ok();
+        let centred = Choice { frame, gain: 0.0, ..turned };
         let more = More::Little(0.06);
         for (reason, beginning) in [
             (tried(Tried::Layout, true, 0.0512), "cost: the wide layout's: yes, 5.1 % fewer"),
@@ -130,6 +141,7 @@ mod tests {
                 "budget: 13 Mwork, 800 nodes",
             ),
             (Reason::Frame(turned), "frame: turned by 29 degrees, 25 % less area"),
+            (Reason::Frame(centred), "frame: no other saves enough area"),
         ] {
             let line = reason.to_string();
             assert!(line.starts_with(beginning) && !line.contains('\n'), "{line}");

@@ -62,6 +62,28 @@ fn only_what_is_open_is_tried_and_only_with_an_open_budget() {
 }
 
 #[test]
+fn few_objects_which_have_an_exact_optimum_and_objects_without_area_are_chosen_for_without_doubt() {
+    let on_a_line = |count: u8| {
+        let at = |x: u8| [f32::from(x), 0.0, 0.0];
+        let triangles = (0..count).map(|x| Triangle::from([at(x), at(x + 1), at(x)])).collect();
+        Scene::new("line", bvh_scenes::SceneKind::File, Primitives::Triangles(triangles))
+    };
+    for (count, tries) in [(1, false), (2, false), (10, false), (11, true)] {
+        let scene = on_a_line(count);
+        let made = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
+            assert!(tries, "rays take as long for one triangle as for many");
+            anywhere(&scene.primitives, tree, seed, is_over)
+        };
+        let found = chosen(&scene, &Open { anywhere: Some(&made), ..BUT_RAYS }, &());
+        let saved = found.reasons.iter().filter_map(|reason| match *reason {
+            Reason::Tried { saved, .. } => Some(saved),
+            _ => None,
+        });
+        assert_eq!(saved.collect::<Vec<f64>>(), if tries { &[0.0; 3][..] } else { &[] });
+    }
+}
+
+#[test]
 fn objects_are_divided_where_they_are_large_and_oblique_and_not_where_they_are_boxes_themselves() {
     let choice = |name: &str| {
         let chosen = chosen(&Scene::load(name).unwrap(), &BUT_RAYS, &());
