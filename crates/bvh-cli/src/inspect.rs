@@ -50,12 +50,12 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
     match &scene {
         Some(scene) => {
             answer.say("valid: yes, over this scene's objects");
+            answer.record("valid", true);
             answer.fact("scene", scene.name.as_str());
         }
         // Without a scene there are no boxes to check against, which the fact must not hide.
-        None => answer.say("valid: as a tree; name a scene to check its objects too"),
+        None => answer.fact("valid", "as a tree; name a scene to check its objects too"),
     }
-    answer.record("valid", true);
     answer.fact("version", Header::VERSION);
     answer.fact("bytes", files::regular(&args.file)?);
     describe(&header, answer);
