@@ -138,6 +138,11 @@ impl Plan {
             BakeError::Search(error) => failed(error),
             BakeError::Rays(source) => traced(source),
         })?;
+        // A file would no longer say that the tree is for rays.
+        if start.is_some() && rays.is_some() && chosen.density.is_none() {
+            let left = "nothing was written; the tree of --from is the best so far";
+            return Err(Error::Interrupted(left.into()));
+        }
         watch.bar.suspend(|| {
             if let Some(step @ 2..) = step.get() {
                 let why = format!("rays: one in {step}, because more would take too much time");

@@ -1,7 +1,7 @@
 //! Ctrl-C while `bvh bake` searches: the best tree so far is written, and it is a good one. Other
 //! commands end at once.
 use crate::support::{
-    begin, bvh, cost, ended, names, number, obj, program, send, text, wait_until, words,
+    begin, bvh, cost, ended, facts, names, number, obj, program, send, text, wait_until, words,
 };
 use bvh_core::Triangle;
 use bvh_scenes::Scene;
@@ -99,6 +99,20 @@ fn ctrl_c_says_what_was_gained_and_also_while_the_frame_is_chosen_keeps_no_worse
     assert!(saved > 0.0 && message.contains(facts["interrupted"].as_str().unwrap()), "{said}");
     let gain = format!("−{:.1} % area of inner nodes against the greedy tree", 100.0 * saved);
     assert!(message.contains(&gain), "{gain}: {message}");
+}
+
+#[test]
+fn ctrl_c_before_a_later_bake_has_its_rays_writes_no_tree_that_is_not_for_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    bvh(at, "bake konistil --budget=0work --rays=default --out=rays.bvh");
+    let child = begin(at, &words("bake konistil --budget=1h --from=rays.bvh --out=a.bvh"));
+    wait_until("the file", || names(at).len() > 1);
+    send("-INT", &child);
+    ended(&child.wait_with_output().unwrap(), 130, &["interrupted; "]);
+    for file in names(at) {
+        assert_eq!(facts(at, &format!("inspect {file}"))["method"], "best for rays", "{file}");
+    }
 }
 
 #[test]
