@@ -105,8 +105,8 @@ impl Rays {
     }
 
     /// Returns a step, up to 64, with which the rays take about this time, by the time that few of
-    /// them take. A good tree of `spot.obj` that is searched on for one in 64 rays loses 0.03 %, for
-    /// one in 512 it loses 5 %.
+    /// them take. A good tree of `spot.obj` that is searched on for one in 64 rays loses 0.03 %,
+    /// for one in 512 it loses 5 %.
     pub fn step_within(
         &self,
         scene: &Scene,
