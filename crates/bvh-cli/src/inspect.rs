@@ -54,7 +54,11 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
             answer.fact("scene", scene.name.as_str());
         }
         // Without a scene there are no boxes to check against, which the fact must not hide.
-        None => answer.fact("valid", "as a tree; name a scene to check its objects too"),
+        None => {
+            answer.say("valid: as a tree; name a scene to check its objects too");
+            answer.record("valid", true);
+            answer.record("scene", serde_json::Value::Null);
+        }
     }
     answer.fact("version", Header::VERSION);
     answer.fact("bytes", files::regular(&args.file)?);
