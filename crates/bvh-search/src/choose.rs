@@ -7,7 +7,8 @@
 
 use crate::bake::Untimed;
 use crate::exact::most_work_of_tiny;
-use crate::reason::{More, Reason, Tried, saved};
+use crate::frames::saved;
+use crate::reason::{More, Reason, Tried};
 use crate::{Bake, BakeError, Baked, Budget, Observer, SearchError, parallel};
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, DensityError, Primitives, RayDensity};

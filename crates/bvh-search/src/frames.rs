@@ -11,7 +11,6 @@
 //! searches over a sample that says more decide.
 
 use crate::parallel;
-use crate::reason::saved;
 use crate::run::stream;
 use crate::{Bake, Budget, Observer, Stream};
 use bvh_build::{Builder, muller_fellner};
@@ -479,6 +478,11 @@ fn random_rotation(rng: &mut Stream) -> DQuat {
             return smallest(rotation.normalize());
         }
     }
+}
+
+/// Returns the fraction by which a cost is below another one; 0 below a cost of 0.
+pub(crate) fn saved(cost: f64, base: f64) -> f64 {
+    if base > 0.0 { 1.0 - cost / base } else { 0.0 }
 }
 
 #[cfg(test)]

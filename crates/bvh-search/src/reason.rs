@@ -107,11 +107,6 @@ impl fmt::Display for Reason {
     }
 }
 
-/// Returns the fraction by which a cost is below another one; 0 below a cost of 0.
-pub(crate) fn saved(cost: f64, base: f64) -> f64 {
-    if base > 0.0 { 1.0 - cost / base } else { 0.0 }
-}
-
 /// Returns the angle of the frame's rotation.
 fn angle(frame: &Frame) -> f64 {
     let rotation = frame.rotation();
