@@ -158,6 +158,10 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
   auto is_in = [&](MeshID volume, const Position& point) {
     return tracer.point_in_volume(trees.of_volume.at(volume), point, nullptr, nullptr);
   };
+  auto normalised = [](double x, double y, double z) {
+    double length = std::sqrt(x * x + y * y + z * z);
+    return Direction{x / length, y / length, z / length};
+  };
   auto direction = [&](const Position& from) {
     double x = normal(random), y = normal(random), z = normal(random);
     if (random() % 3 == 0) {
@@ -169,8 +173,7 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
       if (std::max({std::fabs(edge.x - from.x), std::fabs(edge.y - from.y), std::fabs(edge.z - from.z)}) > 1e-6)
         x = edge.x - from.x, y = edge.y - from.y, z = edge.z - from.z;
     }
-    double length = std::sqrt(x * x + y * y + z * z);
-    return Direction{x / length, y / length, z / length};
+    return normalised(x, y, z);
   };
   Flight flight;
   while (flight.steps < steps) {
@@ -182,8 +185,7 @@ inline Flight fly(RayTracer& tracer, const Trees& trees, const Solids& mesh, lon
       int sides = 1 + int(random() % 26);
       double x = sides % 3 - 1, y = sides / 3 % 3 - 1, z = sides / 9 - 1;
       if (x == 0 && y == 0 && z == 0) x = y = 1;
-      double length = std::sqrt(x * x + y * y + z * z);
-      along = {x / length, y / length, z / length};
+      along = normalised(x, y, z);
     }
     MeshID volume = Solids::LEFT;
     while (volume < Solids::OUTSIDE && !is_in(volume, point)) volume++;

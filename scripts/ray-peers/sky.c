@@ -226,8 +226,9 @@ static double seconds(void) {
 /* sky_open3d.py reads the scene and prints a row. */
 static void trace_by_open3d(const char *scene, size_t free_count) {
     const char *command = getenv("OPEN3D");
-    FILE *pipe = command ? popen(command, "w") : NULL;
-    if (!pipe) return;
+    if (!command) return;
+    FILE *pipe = popen(command, "w");
+    if (!pipe) perror(command), exit(EXIT_FAILURE);
     float rounded[DIRECTIONS][3];
     for (int j = 0; j < DIRECTIONS; j++)
         for (int k = 0; k < 3; k++) rounded[j][k] = (float)directions[j][k];

@@ -43,8 +43,8 @@ def answer():
 
 
 speeds, fractions = zip(*(answer() for _ in range(ROUNDS)))
-least, median, most = sorted(speeds)[0], sorted(speeds)[ROUNDS // 2], sorted(speeds)[-1]
+speeds = sorted(speeds)
 print(
     f'{scene},{triangle_count},{point_count},{direction_count},Open3D,"test_occlusions in the user\'s order",'
-    f"{median:.2f},{least:.2f},{most:.2f},{fractions[0]:.4f}"
+    f"{speeds[ROUNDS // 2]:.2f},{speeds[0]:.2f},{speeds[-1]:.2f},{fractions[0]:.4f}"
 )

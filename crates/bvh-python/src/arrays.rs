@@ -74,13 +74,10 @@ pub fn given<'py>(
 /// Returns the error of a conversion, which names the argument if the argument is at fault: Ctrl-C and
 /// an end of memory are not.
 fn explained(py: Python<'_>, error: PyErr, name: &str, accepted: &str) -> PyErr {
-    let of_argument = |error: &PyErr| {
-        error.is_instance_of::<PyValueError>(py) || error.is_instance_of::<PyTypeError>(py)
-    };
-    match of_argument(&error) {
-        true => invalid(format!("{name}: {}; accepted: {accepted}", error.value(py))),
-        false => error,
+    if error.is_instance_of::<PyValueError>(py) || error.is_instance_of::<PyTypeError>(py) {
+        return invalid(format!("{name}: {}; accepted: {accepted}", error.value(py)));
     }
+    error
 }
 
 /// Converts anything that numpy accepts as an array, and checks its shape. An array that has the

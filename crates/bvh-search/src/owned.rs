@@ -105,8 +105,9 @@ impl OwnedTree {
         };
         let mut owned = Self::bare(objects, choice.and_then(|choice| choice.frame));
         (owned.references, owned.seed) = (references.unwrap_or(1.0), seed);
-        let is_open_frame = frame == Frames::Auto && !Untimed(observer).cancelled();
-        owned.reasons.extend(choice.filter(|_| is_open_frame).map(Reason::Frame));
+        if frame == Frames::Auto && !Untimed(observer).cancelled() {
+            owned.reasons.extend(choice.map(Reason::Frame));
+        }
         let shapes = owned.shapes.as_ref();
         let recorded =
             |tree: &Bvh, _, is_over: &dyn Fn() -> bool| ray_density(tree, shapes, rays, is_over);

@@ -60,19 +60,19 @@ impl fmt::Display for Reason {
                 "frame: the budget is too small to try others; kept are the file's axes",
             ),
             // Triangles in f64 have a frame for its centre, too.
-            Self::Frame(Choice { frame, .. })
-                if frame.is_none_or(|frame| frame.rotation() == DMat3::IDENTITY) =>
+            Self::Frame(Choice { frame: Some(frame), gain, .. })
+                if frame.rotation() != DMat3::IDENTITY =>
             {
-                f.write_str("frame: no other saves enough area; kept are the file's axes")
-            }
-            Self::Frame(Choice { frame, gain, .. }) => {
-                let degrees = frame.as_ref().map_or(0.0, angle).to_degrees();
+                let degrees = angle(frame).to_degrees();
                 let percent = 100.0 * gain;
                 write!(
                     f,
                     "frame: turned by {degrees:.0} degrees, {percent:.0} % less area than along \
                      the file's axes"
                 )
+            }
+            Self::Frame(_) => {
+                f.write_str("frame: no other saves enough area; kept are the file's axes")
             }
             Self::Tried { choice, is_chosen, saved } => {
                 let name = match choice {

@@ -126,9 +126,11 @@ impl Plan {
             let left = watch.left().filter(|_| start.is_none());
             let within = |time| rays.step_within(scene, tree, time, is_over);
             let step = *step.get_or_init(|| left.map_or(1, |left| within(left / SHARE)));
-            // So few may miss the scene.
-            let some = rays.density(scene, tree, step, seed, is_over);
-            some.or_else(|_| rays.density(scene, tree, 1, seed, is_over))
+            match rays.density(scene, tree, step, seed, is_over) {
+                // So few may miss the scene.
+                Err(_) if step > 1 => rays.density(scene, tree, 1, seed, is_over),
+                made => made,
+            }
         };
         let rays: Option<MadeRays> = if rays.is_some() { Some(&made) } else { None };
         let untimed: &dyn Observer = if open.budget { &watch } else { &INTERRUPTED };
