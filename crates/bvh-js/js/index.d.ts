@@ -2,7 +2,11 @@ import type { BufferGeometry, Intersection, Material, Mesh, Ray, Side } from 'th
 import type { MeshBVH } from 'three-mesh-bvh';
 
 export interface BakeOptions {
-    /** How long to search, in seconds. 1 if neither `seconds` nor `work` is given; with both, the first ends the search. */
+    /**
+     * How long to search, in seconds. With `work`, the first that is spent ends the search; with neither, the bake chooses
+     * its work by the number of triangles, as `bvh bake --for three-mesh-bvh` does: half a second for a thousand, half a
+     * minute for fifty thousand.
+     */
     seconds?: number;
     /** How much to search, in nodes visited: the same tree on every machine, as of `bvh bake --budget 50Mwork`. */
     work?: number;

@@ -194,8 +194,7 @@ function checkNames(options, accepted) {
 
 function checked(options, more = []) {
     checkNames(options, ['seconds', 'work', 'seed', 'references', 'orient', 'onProgress', ...more]);
-    const { work, seed = 1, references = 1, orient: orients = false, onProgress, signal } = options;
-    const { seconds = work === undefined ? 1 : undefined } = options;
+    const { seconds, work, seed = 1, references = 1, orient: orients = false, onProgress, signal } = options;
     const check = (name, value, accepted, isAccepted) => {
         if (value !== undefined && !(typeof value === 'number' && isAccepted(value))) {
             const found = typeof value === 'string' ? `"${value}"` : value;

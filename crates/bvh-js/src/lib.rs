@@ -95,7 +95,7 @@ impl Observer for Watch {
 }
 
 /// Searches a tree over triangles of nine coordinates each, for `seconds` or up to so much `work`, in
-/// nodes visited. Returns the [parts](parts) of the tree.
+/// nodes visited, or as much as a bake chooses. Returns the [parts](parts) of the tree.
 #[wasm_bindgen]
 pub fn bake(
     corners: &Float32Array,
@@ -105,13 +105,16 @@ pub fn bake(
     references: f64,
     follower: Option<Function>,
 ) -> Result<Array, JsValue> {
-    let most_work = work.map(|work| work as u64);
+    let start = now();
     let limit = seconds.map(|seconds| 1000.0 * seconds);
-    let watch =
-        Watch { start: now(), limit, most_work, counted: 0.into(), estimate: [f64::NAN; 2] };
     let shapes = Primitives::Triangles(triangles(corners)?);
     let boxes = shapes.boxes();
-    let budget = Budget { max_work: most_work, ..Budget::UNLIMITED };
+    let budget = match (work, seconds) {
+        (None, None) => Budget::of_objects(boxes.len()),
+        _ => Budget { max_work: work.map(|work| work as u64), ..Budget::UNLIMITED },
+    };
+    let most_work = budget.max_work;
+    let watch = Watch { start, limit, most_work, counted: 0.into(), estimate: [f64::NAN; 2] };
     let seed = seed as u64;
     let bake = Bake { shapes: Some(&shapes), references, seed, budget, ..Bake::new(&boxes) };
     FOLLOWER.set(follower);

@@ -372,6 +372,9 @@ test('a saved tree is the file of the program, and loads for its own geometry on
     for (const form of ['bytes', Promise.resolve(buffer), 5, undefined]) {
         await assert.rejects(Tree.load(form, geometry), { name: 'TypeError', message: /bytes is .*accepted: an ArrayBuffer/ });
     }
+    const chosen = (await bake(geometry)).save();
+    const own = { work: 8000 * geometry.index.count / 3 };
+    assert.deepEqual(chosen, (await bakeInWorker(geometry, own)).save());
     if (!process.env.BVH) return;
     const folder = mkdtempSync(join(tmpdir(), 'bvh-'));
     const position = geometry.attributes.position.array;
@@ -383,6 +386,8 @@ test('a saved tree is the file of the program, and loads for its own geometry on
     writeFileSync(mesh, lines.join('\n'));
     execFileSync(process.env.BVH, ['bake', mesh, '--budget', '1Mwork', '--seed', '7', '--out', out], { stdio: 'pipe' });
     assert.ok(readFileSync(out).equals(bytes));
+    execFileSync(process.env.BVH, ['bake', mesh, '--for', 'three-mesh-bvh', '--out', out], { stdio: 'pipe' });
+    assert.ok(readFileSync(out).equals(chosen));
     const exported = join(folder, 'tree.bin');
     execFileSync(process.env.BVH, ['export', out, mesh, '--for', 'three-mesh-bvh', '--out', exported], { stdio: 'pipe' });
     const file = readFileSync(exported);

@@ -1,6 +1,6 @@
 """Counts the hours of direct sun on every face of a mesh, on some days of the year.
 
-Run `python sun_hours.py [mesh.glb] [--latitude 52] [--dates 2026-06-21 ...] [--step 10]`, or cell by
+Run `python sun_hours.py [mesh.glb] [--latitude 52] [--dates 2026-06-21,...] [--step 10]`, or cell by
 cell in an editor that knows `# %%`. Needs pandas and trimesh. Lengths are in metres; x points to the
 east, y to the north and z up. The sun is simple: its declination is off by up to a degree, and noon
 is when it is highest. The program `bvh sky` uses exact positions, and also writes pictures.
@@ -18,8 +18,7 @@ from bvh_search import Tracer, Tree
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("mesh", nargs="?", help="the path of a mesh file")
 parser.add_argument("--latitude", type=float, default=52.0, help="degrees north")
-parser.add_argument("--dates", nargs="+", type=datetime.date.fromisoformat, metavar="YYYY-MM-DD",
-                    default=[datetime.date(2026, month, 21) for month in (3, 6, 12)])
+parser.add_argument("--dates", default="2026-03-21,2026-06-21,2026-12-21", metavar="DATE,...")
 parser.add_argument("--step", type=float, default=10.0, help="minutes between positions of the sun")
 arguments = parser.parse_args([] if hasattr(sys, "ps1") else None)
 if arguments.mesh:
@@ -32,8 +31,8 @@ else:
     mesh = mesh.subdivide_to_size(5)
 # %% The sun in the middle of every step, in solar time, with the declination of Cooper (1969).
 latitude, step = np.radians(arguments.latitude), arguments.step / 60
-names = [str(date) for date in arguments.dates]
-days = [date.timetuple().tm_yday for date in arguments.dates]
+names = arguments.dates.split(",")
+days = [datetime.date.fromisoformat(name).timetuple().tm_yday for name in names]
 tilt = np.radians(23.45) * np.sin(2 * np.pi * (284 + np.array(days)) / 365)
 turn = np.radians(15 * (np.arange(step / 2, 24, step) - 12))[:, None]
 north = np.cos(latitude) * np.sin(tilt) - np.sin(latitude) * np.cos(tilt) * np.cos(turn)

@@ -257,7 +257,7 @@ def test_numbers_beyond_the_exact_range_are_named_with_the_range(number):
         (lambda: Tracer(double()).nearest(*DOWN, exclude=[0]), r"^exclude has shape \(1,\); accepted: one index, \(2,\) or \(2, k\), as origins$"),
         (lambda: Tracer(double()).any(*DOWN, exclude=[[[0]], [[0]]]), r"^exclude has shape \(2, 1, 1\); accepted: "),
         (lambda: Tracer(double()).any(*DOWN, exclude=[0.0, 1.0]), "^exclude has dtype float64; accepted: integers$"),
-        (lambda: double().export("json"), "accepted: a tree of a bake in single precision with the file's frame$"),
+        (lambda: double().export("json"), "accepted: a tree baked in single precision with the frame .file.$"),
     ],
 )
 def test_errors_of_precisions_and_selections_name_the_argument(call, message):

@@ -52,7 +52,7 @@ pub enum ExportError {
     /// The boxes lie in a [frame](crate::Frame), but those of other tracers along the file's axes.
     #[error(
         "the boxes of the tree lie in a frame, but those of other tracers along the file's axes; \
-         accepted: a tree of a bake in single precision with the file's frame"
+         accepted: a tree baked in single precision with the frame `file`"
     )]
     Framed,
     /// The tree divides objects, which a query for all hits would find more than once there.
