@@ -77,6 +77,7 @@ pub struct TraceRow {
     pub layout: String,
     /// Kind of the rays, the same ones for all methods and layouts.
     pub rays: String,
+    /// Number of the rays.
     pub count: u64,
     /// Number of rays that hit something.
     pub hits: u64,
@@ -103,8 +104,10 @@ impl Row for TraceRow {
 pub struct TraceTimeRow {
     pub scene: String,
     pub method: String,
+    /// Layout of the tree in memory while rays are traced.
     pub layout: String,
     pub rays: String,
+    /// Number of the rays.
     pub count: u64,
     /// Turns that were timed.
     pub rounds: u32,

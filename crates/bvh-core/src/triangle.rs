@@ -107,8 +107,8 @@ impl Triangle {
 
     /// Returns the distance at which the ray crosses the triangle, in real arithmetic, if that
     /// distance is in the ray's range. The same as [`intersect`](Self::intersect), but of the
-    /// triangles that meet in an edge or a corner, the ray crosses only those that it would cross
-    /// if its origin were moved by (ε, ε², ε³) with an infinitely small ε > 0. The line of a ray
+    /// triangles that meet in an edge or a corner, the ray crosses only those that its line would
+    /// cross if it were moved by (ε, ε², ε³) with an infinitely small ε > 0. The line of a ray
     /// crosses a closed mesh an even number of times.
     ///
     /// Source: Edelsbrunner & Mücke 1990, 'Simulation of simplicity'.

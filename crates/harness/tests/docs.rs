@@ -163,17 +163,6 @@ fn the_page_of_tracers_has_every_target_and_whether_its_trees_divide_triangles()
     assert_eq!(rows.collect::<Vec<_>>(), targets);
 }
 
-#[test]
-fn every_experiment_is_checked_on_every_commit() {
-    let run = fs::read_to_string(top().join(".ci/run")).unwrap();
-    let words: BTreeSet<&str> = run.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
-    for (name, text) in experiments() {
-        // `.ci/nightly` builds the attic.
-        let needs_attic = text.contains("--manifest-path attic/Cargo.toml");
-        assert!(words.contains(name.as_str()) || needs_attic, ".ci/run does not check {name}");
-    }
-}
-
 /// Collects the CSV files in a folder and its subfolders.
 fn tables(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {

@@ -50,10 +50,11 @@ impl WideBvh {
     /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest
     /// first; among hits at the same distance the lowest id first.
     ///
-    /// Through an edge or a corner, the ray hits only the triangles that it would hit if its origin
+    /// Through an edge or a corner, the ray hits only the triangles that its line would hit if it
     /// were moved by (ε, ε², ε³) with an infinitely small ε > 0. The number of hits of a line with
-    /// a closed mesh is therefore even, and a half line that begins inside has an odd number. All
-    /// kernels give the hits of [`Triangle::crossing`](crate::Triangle::crossing), bit by bit.
+    /// a closed mesh is therefore even, and a half line that begins inside it, not on it, has an
+    /// odd number, but for distances beyond f32. All kernels give the hits of
+    /// [`Triangle::crossing`](crate::Triangle::crossing), bit by bit.
     ///
     /// The distances are those of [`nearest_hit`](Self::nearest_hit).
     ///

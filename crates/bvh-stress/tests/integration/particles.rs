@@ -6,7 +6,8 @@
 //!
 //! 1. A face is passed once: those at the particle's place are excluded.
 //! 2. The particle is in its volume if the first face ahead that bounds the volume leaves it. This is
-//!    exact, and fails only where rounding carried the particle across a face: a *slip*.
+//!    exact, and fails only where rounding carried the particle across a face, a *slip*, or where the
+//!    ray touches an edge.
 //! 3. After a slip, the first face of all ahead tells the volume, by the side from which the particle
 //!    comes. Where faces of both sides are first, the ray meets an edge, and another half line from
 //!    the way there tells it.

@@ -47,6 +47,7 @@ impl Point<'_> {
 #[derive(Serialize)]
 pub(super) struct Reached<'a> {
     scene: &'a str,
+    /// Distance above the best known cost to reach.
     target: String,
     method: &'a str,
     /// All runs.

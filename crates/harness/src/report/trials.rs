@@ -25,6 +25,7 @@ pub(super) struct Point<'a> {
     scene: &'a str,
     scene_kind: &'a str,
     method: &'a str,
+    /// Number of trials of which the best is taken.
     trials: usize,
     /// Best of the first `trials` trials of the first repetition.
     single_run_over_base: f64,

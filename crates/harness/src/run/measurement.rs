@@ -41,12 +41,25 @@ impl Measurement<'_> {
     pub fn take(&self, jobs: &Jobs, store: &Store, summary: &mut Summary) -> Result<(), Error> {
         let Experiment { scenes, methods, .. } = jobs.experiment;
         match self {
-            Self::Runs => runs::measure(jobs, store, summary),
+            Self::Runs => {
+                let all = jobs.experiment.measurements();
+                let needs_tree = |repetition| all.iter().any(|of| of.needs_tree(repetition));
+                runs::measure(jobs, &needs_tree, store, summary)
+            }
             Self::Traced(keys) => trace::measure(keys, jobs, store, summary),
             Self::RayCost(config) => ray_cost::measure(config, jobs, store),
             Self::Suite(effort) => {
                 stress::execute(effort, scenes, methods, store, &|| jobs.watch.cancelled())
             }
+        }
+    }
+
+    /// Whether the measurement takes the trees of runs of this repetition.
+    pub fn needs_tree(&self, repetition: u32) -> bool {
+        match self {
+            Self::Runs | Self::Suite(_) => false,
+            Self::Traced(_) => repetition == 0,
+            Self::RayCost(_) => true,
         }
     }
 

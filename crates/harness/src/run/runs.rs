@@ -10,8 +10,14 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// Performs the runs that are missing or damaged in the store, and keeps each once it finishes.
-pub(crate) fn measure(jobs: &Jobs, store: &Store, summary: &mut Summary) -> Result<(), Error> {
+/// Performs the runs that are missing or damaged in the store, and keeps each once it finishes, with
+/// its tree if a later measurement needs those of its repetition.
+pub(crate) fn measure(
+    jobs: &Jobs,
+    needs_tree: &(dyn Fn(u32) -> bool + Sync),
+    store: &Store,
+    summary: &mut Summary,
+) -> Result<(), Error> {
     let missing = missing_runs(jobs, store, &mut summary.remarks);
     let runs = jobs.list.len();
     let finished = AtomicUsize::new(runs - missing.len());
@@ -22,7 +28,7 @@ pub(crate) fn measure(jobs: &Jobs, store: &Store, summary: &mut Summary) -> Resu
     let run = |job: &&Job| -> Result<(), Error> {
         let Some(run) = perform(jobs, job)? else { return Ok(()) };
         store.keep(job.index, &run.rows()?)?;
-        if jobs.experiment.needs_tree(job.repetition) {
+        if needs_tree(job.repetition) {
             jobs.trees().insert(job.index, Arc::new(run.outcome.tree));
         }
         finished.fetch_add(1, Relaxed);

@@ -101,11 +101,6 @@ impl Experiment {
         self.ray_cost.as_ref().filter(|config| config.count > 0)
     }
 
-    /// Returns true if a measurement after the runs needs the trees of this repetition.
-    pub fn needs_tree(&self, repetition: u32) -> bool {
-        self.judges().is_some() || self.tracing.is_some() && repetition == 0
-    }
-
     /// Returns true if a report measures gaps, for which runs keep the times of improvements.
     pub fn needs_references(&self) -> bool {
         self.reports.iter().any(Report::needs_references)
