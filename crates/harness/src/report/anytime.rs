@@ -75,12 +75,15 @@ impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut points = Vec::new();
         let mut reached = Vec::new();
+        let mut has_builders = false;
         for scene in rows.scenes() {
             // A scene without a reference has no gaps.
             let Some(reference) = rows.reference(scene) else { continue };
             for method in &self.methods {
                 let runs = rows.series(scene, method);
-                points.extend(curve(scene, method, &runs, reference.cost));
+                let corners = curve(scene, method, &runs, reference.cost);
+                has_builders |= corners.len() == 1;
+                points.extend(corners);
                 reached.extend(self.targets.iter().map(|&percent| {
                     let cost = reference.cost * (1.0 + percent / 100.0);
                     let target = format!("best known +{percent} %");
@@ -102,12 +105,17 @@ impl Config {
             percent_y: true,
             ..Drawing::default()
         };
-        let caption = "Median and quartiles over repetitions. Points are builders. A curve falls \
-                       to the floor where it is the best known.";
+        let mut caption = String::from("Median and quartiles over repetitions.");
+        if has_builders {
+            caption += " Points are builders.";
+        }
+        if points.iter().any(|point| point.gap_median == 0.0) {
+            caption += " A curve falls to the floor where it is the best known.";
+        }
         let mut output = Output::default();
         let names = self.names();
         output.add_csv(&names[0], &corners(&points))?;
-        output.add_figure(&names[0], caption, 2, figure.panels(rows, &output.table()?));
+        output.add_figure(&names[0], &caption, 2, figure.panels(rows, &output.table()?));
         if let Some(targets) = names.get(1) {
             output.add_csv(targets, &reached)?;
         }

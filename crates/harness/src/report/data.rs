@@ -70,9 +70,13 @@ impl Rows {
         distinct(self.runs.iter().map(|run| run.scene.as_str()))
     }
 
-    /// Returns the scene's kind, as in `runs.csv`.
+    /// Returns the kind of a scene, or of what stands turned or in part in `runs.csv`.
     pub fn kind(&self, scene: &str) -> &str {
-        self.runs.iter().find(|run| run.scene == scene).map_or("", |run| run.scene_kind.as_str())
+        let is_of = |run: &&RunRow| {
+            let rest = run.scene.strip_prefix(scene);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(':'))
+        };
+        self.runs.iter().find(is_of).map_or("", |run| run.scene_kind.as_str())
     }
 
     /// Returns the scene's name for tables and figures: its kind follows unless it is a file.

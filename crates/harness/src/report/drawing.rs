@@ -158,7 +158,7 @@ impl Drawing {
         let by_series = grouped(table.iter().copied(), |row| self.series_of(row));
         let count = by_series.len() as f64;
         let mut layers = Vec::new();
-        let mut beside = Vec::new();
+        let mut beside: BTreeMap<usize, Vec<(f64, f64)>> = BTreeMap::new();
         for (number, (series, table)) in (0..).zip(by_series) {
             let mut points = Vec::new();
             let mut spans = Vec::new();
@@ -169,11 +169,20 @@ impl Drawing {
                 points.push((value, height));
                 let ends = self.ends_in(row, &self.x);
                 spans.extend(ends.map(|(low, high)| [(low, height), (high, height)]));
-                beside.extend(number_in(row, &self.beside).map(|value| (value, height)));
+                let value = number_in(row, &self.beside);
+                beside.entry(place).or_default().extend(value.map(|value| (value, height)));
             }
             layers.push(Layer::new(&series, Marks::Spans(spans)));
             layers.push(Layer::new(series, Marks::Points(points)));
         }
+        let one_a_name = |(place, values): (usize, Vec<(f64, f64)>)| {
+            let value = values.first().map(|first| first.0);
+            match values.iter().all(|other| Some(other.0) == value) {
+                true => value.map(|value| (value, place as f64)).into_iter().collect(),
+                false => values,
+            }
+        };
+        let beside: Vec<(f64, f64)> = beside.into_iter().flat_map(one_a_name).collect();
         if !beside.is_empty() {
             layers.push(Layer::new("paper", Marks::Points(beside)));
         }
@@ -199,7 +208,8 @@ impl Drawing {
 
     fn shown(&self, rows: &Rows, column: &str, text: &str) -> String {
         let own = self.names.get(text).cloned();
-        own.unwrap_or_else(|| if column == "scene" { rows.shown(text) } else { text.into() })
+        let is_scene = ["scene", "mesh"].contains(&column);
+        own.unwrap_or_else(|| if is_scene { rows.shown(text) } else { text.into() })
     }
 
     fn points(&self, column: &str, table: &[&Row]) -> Vec<Point> {
@@ -297,7 +307,7 @@ b,x,8,7,9,16,6,,1
             (
                 "x = 'cost'\ny = 'scene'\nseries = ['method']\nselect = 'scene=a'\nbeside = 'paper'",
                 &[" ; x Spans([[(1.0, -0.2), (3.0, -0.2)]]); x Points([(2.0, -0.2)]); \
-                   y Points([(4.0, 0.2)]); paper Points([(2.5, -0.2)])"][..],
+                   y Points([(4.0, 0.2)]); paper Points([(2.5, 0.0)])"][..],
             ),
             (
                 "x = 'cost'\ny = 'scene, method'\nselect = 'scene=b'\nends = ['least', 'cost']\nline_at = 1.0",
