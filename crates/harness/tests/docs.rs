@@ -15,6 +15,7 @@ mod queries;
 mod support;
 
 use bvh_core::export::Target;
+use harness::report::Report;
 use queries::table;
 use regex_lite::{Captures, Regex};
 use std::collections::{BTreeMap, BTreeSet};
@@ -161,6 +162,15 @@ fn the_page_of_tracers_has_every_target_and_whether_its_trees_divide_triangles()
     });
     let targets = Target::ALL.map(|target| (target.name, target.references > 1.0));
     assert_eq!(rows.collect::<Vec<_>>(), targets);
+}
+
+#[test]
+fn the_page_of_experiments_lists_every_kind_of_report() {
+    let page = fs::read_to_string(top().join("docs/evidence/EXPERIMENTS.md")).unwrap();
+    let rows = page.lines().skip_while(|line| !line.starts_with("| `kind` |")).skip(2);
+    let rows = rows.map_while(|line| line.split('|').nth(1)).map(|name| name.trim());
+    let kinds = Report::NAMES.iter().map(|name| format!("`{name}`"));
+    assert_eq!(rows.collect::<Vec<_>>(), kinds.collect::<Vec<_>>());
 }
 
 /// Collects the CSV files in a folder and its subfolders.

@@ -1,6 +1,6 @@
 //! Reports made from an experiment's CSV files: tables, figures, and comparisons with the paper.
 //!
-//! A kind of report is one file and a variant of [`Report`]. Reports read CSV files only.
+//! A kind of report is one file and a line of `kinds!`. Reports read CSV files only.
 
 pub mod anytime;
 mod colours;
@@ -29,61 +29,64 @@ use query_column::Column;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
-/// One report of a spec.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-#[allow(clippy::large_enum_variant, reason = "a spec has few reports")]
-pub enum Report {
+/// Declares the kinds of reports: a variant each, its name in specs, and the file of its `Config`.
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $kind:ident = $name:literal in $file:ident;)*) => {
+        /// One report of a spec.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "kind")]
+        #[allow(clippy::large_enum_variant, reason = "a spec has few reports")]
+        pub enum Report {
+            $($(#[$doc])* #[serde(rename = $name)] $kind($file::Config),)*
+        }
+
+        impl Check for Report {
+            fn check(&self) -> Result<(), OutOfRange> {
+                match self {
+                    $(Self::$kind(config) => config.check(),)*
+                }
+            }
+        }
+
+        impl Report {
+            /// The names of all kinds.
+            pub const NAMES: &[&str] = &[$($name),*];
+
+            /// Reads the configuration of a report of the kind `name`; `None` if there is none of
+            /// this name. Unlike deserialising a whole report, hands `config` on unbuffered, so
+            /// that its errors know their place.
+            pub fn read<'de, D: Deserializer<'de>>(
+                name: &str,
+                config: D,
+            ) -> Result<Option<Self>, D::Error> {
+                Ok(Some(match name {
+                    $($name => Self::$kind(Deserialize::deserialize(config)?),)*
+                    _ => return Ok(None),
+                }))
+            }
+
+            fn write(&self, rows: &Rows) -> Result<Output, Error> {
+                match self {
+                    $(Self::$kind(config) => config.finish(config.write(rows)?, rows),)*
+                }
+            }
+        }
+    };
+}
+
+kinds! {
     /// The best of so many trials.
-    Trials(trials::Config),
+    Trials = "trials" in trials;
     /// Cost against generation.
-    Generations(generations::Config),
+    Generations = "generations" in generations;
     /// Error against run time.
-    Anytime(anytime::Config),
+    Anytime = "anytime" in anytime;
     /// Rows of a CSV file of a run or of an earlier report, selected, grouped, aggregated and drawn.
-    Query(query_report::Config),
+    Query = "query" in query_report;
 }
 
-impl Check for Report {
-    fn check(&self) -> Result<(), OutOfRange> {
-        match self {
-            Self::Trials(config) => config.check(),
-            Self::Generations(config) => config.check(),
-            Self::Anytime(config) => config.check(),
-            Self::Query(config) => config.check(),
-        }
-    }
-}
-
+// What kinds differ in names all of them, so that the compiler asks for a new one.
 impl Report {
-    /// The names of all kinds.
-    pub const NAMES: &[&str] = &["trials", "generations", "anytime", "query"];
-
-    /// Reads the configuration of a report of the kind `name`; `None` if there is none of this
-    /// name. Unlike deserialising a whole report, hands `config` on unbuffered, so that its errors
-    /// know their place.
-    pub fn read<'de, D: Deserializer<'de>>(
-        name: &str,
-        config: D,
-    ) -> Result<Option<Self>, D::Error> {
-        Ok(Some(match name {
-            "trials" => Self::Trials(Deserialize::deserialize(config)?),
-            "generations" => Self::Generations(Deserialize::deserialize(config)?),
-            "anytime" => Self::Anytime(Deserialize::deserialize(config)?),
-            "query" => Self::Query(Deserialize::deserialize(config)?),
-            _ => return Ok(None),
-        }))
-    }
-
-    fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        match self {
-            Self::Trials(config) => config.finish(config.write(rows)?, rows),
-            Self::Generations(config) => config.finish(config.write(rows)?, rows),
-            Self::Anytime(config) => config.finish(config.write(rows)?, rows),
-            Self::Query(config) => config.finish(config.write(rows)?, rows),
-        }
-    }
-
     /// Returns the labels of the methods that the report names, each with its key.
     pub fn labels(&self) -> Vec<(String, &str)> {
         let (own, figure) = match self {
@@ -106,7 +109,7 @@ impl Report {
             Self::Trials(config) => config.methods.clone(),
             Self::Generations(config) => vec![config.method.clone(), config.baseline.clone()],
             Self::Query(config) => config.trial_methods(),
-            _ => vec![],
+            Self::Anytime(_) => vec![],
         }
     }
 
@@ -123,15 +126,21 @@ impl Report {
 
     /// Returns the CSV files that the report reads by name, each with its key.
     pub fn reads(&self) -> Vec<(&str, &str)> {
-        let Self::Query(config) = self else { return vec![] };
+        let config = match self {
+            Self::Query(config) => config,
+            Self::Trials(_) | Self::Generations(_) | Self::Anytime(_) => return vec![],
+        };
         let files = [("rows", config.rows.as_str()), ("join", &config.join)];
         files.into_iter().filter(|(key, file)| *key == "rows" || !file.is_empty()).collect()
     }
 
     /// Returns true if the report measures gaps, for which it needs the times of events.
     pub fn needs_references(&self) -> bool {
-        matches!(self, Self::Anytime(_))
-            || self.reads().iter().any(|(_, file)| *file == ReferenceRow::FILE)
+        match self {
+            Self::Anytime(_) => true,
+            Self::Query(_) => self.reads().iter().any(|(_, file)| *file == ReferenceRow::FILE),
+            Self::Trials(_) | Self::Generations(_) => false,
+        }
     }
 }
 

@@ -79,7 +79,7 @@ fn end_of_tail(sorted: &[f64], m: usize, fitted: usize) -> f64 {
     let threshold = sorted[fitted];
     let scale = sorted[..fitted].iter().map(|value| threshold - value).sum::<f64>() / fitted as f64;
     let expected_below = m as f64 * (fitted + 1) as f64 / (n + 1) as f64;
-    let scales = fitted as f64 * ((expected_below / TAIL).powf(1.0 / fitted as f64) - 1.0);
+    let scales = fitted as f64 * (libm::pow(expected_below / TAIL, 1.0 / fitted as f64) - 1.0);
     threshold - scales.max(0.0) * scale
 }
 

@@ -102,7 +102,7 @@ pub fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 
 /// Returns the geometric mean of positive values; NaN if there are no values.
 pub fn geometric_mean(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
+    libm::exp(values.iter().copied().map(libm::log).sum::<f64>() / values.len() as f64)
 }
 
 /// Returns the variance of the distribution that values are drawn from; `None` for fewer than two
@@ -164,8 +164,8 @@ pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
     let freedom = pairs.checked_sub(3).filter(|&freedom| freedom > 0)?;
     let half = NORMAL_95 / (freedom as f64).sqrt();
     // The transformed correlation is nearly normal with a known variance.
-    let transformed = correlation.atanh();
-    Some(((transformed - half).tanh(), (transformed + half).tanh()))
+    let transformed = libm::atanh(correlation);
+    Some((libm::tanh(transformed - half), libm::tanh(transformed + half)))
 }
 
 /// Returns Spearman's rank correlation of pairs: Pearson's correlation of their ranks. Equal values
