@@ -15,6 +15,10 @@ impl Answer {
         Self { facts: is_json.then(Map::new) }
     }
 
+    pub fn is_json(&self) -> bool {
+        self.facts.is_some()
+    }
+
     /// Prints a line for people.
     pub fn say(&self, line: &str) {
         if self.facts.is_none() {

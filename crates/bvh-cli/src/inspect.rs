@@ -111,6 +111,7 @@ fn describe(header: &Header, answer: &mut Answer) {
     answer.fact("cost when saved", header.cost);
     answer.fact("checksum of the scene", format!("{:08x}", header.scene));
     answer.fact("objects", header.objects);
+    answer.fact("precision", if header.is_double { "double" } else { "single" });
     answer.fact("references", header.references);
     answer.fact("nodes", header.nodes);
 }

@@ -144,6 +144,9 @@ fn answered_by(command: Command, answer: &mut Answer) -> Result<(), Error> {
         Command::Report(args) => report::report(&args, answer)?,
         Command::Sky(args) => sky::sky(&args, answer)?,
         Command::Scenes => scenes::scenes(answer)?,
+        Command::Completions { .. } if answer.is_json() => {
+            return Err(Error::Usage("--json: completions are a script; accepted: none".into()));
+        }
         Command::Completions { shell } => {
             let mut file = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "bvh", &mut file);

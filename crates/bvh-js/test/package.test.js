@@ -384,7 +384,7 @@ test('a saved tree is the file of the program, and loads for its own geometry on
     for (let at = 0; at < index.length; at += 3) lines.push(`f ${[0, 1, 2].map((corner) => index[at + corner] + 1).join(' ')}`);
     const [mesh, out] = ['mesh.obj', 'tree.bvh'].map((name) => join(folder, name));
     writeFileSync(mesh, lines.join('\n'));
-    execFileSync(process.env.BVH, ['bake', mesh, '--budget', '1Mwork', '--seed', '7', '--out', out], { stdio: 'pipe' });
+    execFileSync(process.env.BVH, ['bake', mesh, '--for', 'three-mesh-bvh', '--budget', '1Mwork', '--seed', '7', '--out', out], { stdio: 'pipe' });
     assert.ok(readFileSync(out).equals(bytes));
     execFileSync(process.env.BVH, ['bake', mesh, '--for', 'three-mesh-bvh', '--out', out], { stdio: 'pipe' });
     assert.ok(readFileSync(out).equals(chosen));

@@ -1,7 +1,7 @@
 """Counts the hours of direct sun on every face of a mesh, on some days of the year.
 
 Run `python sun_hours.py [mesh.glb] [--latitude 52] [--dates 2026-06-21,...] [--step 10]`, or cell by
-cell in an editor that knows `# %%`. Needs pandas and trimesh. Lengths are in metres; x points to the
+cell in an editor that knows `# %%`. Needs pandas, pillow and trimesh. Lengths are in metres; x points to the
 east, y to the north and z up. The sun is simple: its declination is off by up to a degree, and noon
 is when it is highest. The program `bvh sky` uses exact positions, and also writes pictures.
 """

@@ -92,7 +92,7 @@ pub struct BakeArgs {
     /// Without --rays, a tree for rays is continued for the default ones.
     #[arg(long, value_name = "FILE.bvh")]
     pub from: Option<PathBuf>,
-    /// Cut the scene by space into N parts, bake each into the folder `FILE.parts`, and join their
+    /// Cut the scene by space into N parts, bake each into `FILE.parts` beside FILE.bvh, and join their
     /// trees under a greedy top. Finished parts are not baked again.
     #[arg(long, value_name = "N", requires = "budget", help_heading = ADVANCED)]
     #[arg(conflicts_with_all = ["rays", "from", "explain"])]

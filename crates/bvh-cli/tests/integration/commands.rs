@@ -106,6 +106,7 @@ fn contents(at: &Path) -> Vec<(String, Option<Vec<u8>>)> {
 /// Commands, each with words of the message that rejects it. The work of LONG and of VAST would take
 /// so long that a test of it would time out.
 const WRONG: &str = "
+completions bash --json ! --json | a script
 bake spheres75 --budget=1h --out=full ! --out: full | .bvh
 bake spheres75 --budget=1h --out=no/x.bvh ! no is no folder | accepted: a path in a folder
 bake mesh.obj --budget=1h --out=mesh.obj ! --out: mesh.obj | .bvh

@@ -22,7 +22,12 @@ fn the_facts_begin_with_the_validity_and_are_the_same_in_json_and_from_verify() 
         names.map(|name| name.to_lowercase().replace([' ', '–'], "_")).collect();
     names.sort_unstable();
     let json = facts(at, "verify x.bvh spheres75");
-    assert!(json["objects"] == 75 && json["method"] == "best" && json["depth"].is_u64());
+    assert!(
+        json["objects"] == 75
+            && json["precision"] == "single"
+            && json["method"] == "best"
+            && json["depth"].is_u64()
+    );
     assert!(json["valid"] == true && json["saved"] == 0.0 && json["greedy_area"] == json["area"]);
     assert!(json.keys().eq(&names), "{json:?}");
     // Without a scene nobody knows whether the boxes contain their objects.
