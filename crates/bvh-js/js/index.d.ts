@@ -7,16 +7,18 @@ export interface BakeOptions {
      * its work by the number of triangles, as `bvh bake --for three-mesh-bvh` does: a fifth of a second for a thousand,
      * about ten seconds for fifty thousand.
      */
-    seconds?: number;
+    seconds?: number | undefined;
     /** How much to search, in nodes visited: the same tree on every machine, as of `bvh bake --for three-mesh-bvh --budget 50Mwork`. */
-    work?: number;
+    work?: number | undefined;
     /** Seed of the random numbers. */
-    seed?: number;
+    seed?: number | undefined;
     /**
      * Up to so many leaves per triangle on average, 1 to 16; 1 keeps triangles whole. In buildings, 1.3 makes the first
-     * hits of rays much cheaper. `raycast` finds a divided triangle once, but `shapecast` meets it once for each part.
+     * hits of rays much cheaper. `raycast` finds a divided triangle once, but `shapecast`, and `raycast` of a tree that
+     * three-mesh-bvh has serialised, meet it once for each part. `MeshBVHUniformStruct` loses parts: for shaders, keep
+     * triangles whole.
      */
-    references?: number;
+    references?: number | undefined;
     /**
      * Called about twenty times a second with the part of the budget that is spent, after improvements with about the
      * `cost` that the tree would have, and at the end with 1 and its cost. An exception ends the search, and `bake` and
@@ -58,7 +60,10 @@ export class Tree {
 /**
  * Searches the best tree of a geometry in this thread. Where rays would take more tests in it than in a greedy tree, as in
  * some smooth meshes, gives the greedy tree; this is counted where it takes at most a quarter of the time. The tree has the
- * triangles of the draw range, those of all groups and of none, as three.js draws them.
+ * triangles of the draw range, also those in gaps between groups, which three.js draws with a single material only.
+ *
+ * The first tree takes a second for a million triangles, whatever `seconds` is. The memory of this thread's WebAssembly
+ * stays, 0.5 kB per triangle of the largest mesh; that of `bakeInWorker` goes back.
  *
  * Rejects a geometry without triangles, with an index beyond its vertices (`RangeError`), with coordinates that are not
  * finite (`RangeError`), with morph targets or skin weights, and anything else than a geometry (`TypeError`).
@@ -90,10 +95,11 @@ export function bakeInWorker(mesh: Mesh, options: BakeOptions & { orient: true; 
  * that a tree saves, in a sample of the triangles. Where no other axes certainly save some, `turned` is false, `gain` is 0,
  * and nothing changes. The same on every machine; takes a second or two.
  *
- * Changes the geometry: `position`, `normal` and `tangent` are new attributes of single precision. Clone it first if meshes
- * beyond the scene have it, too. Vectors in other attributes do not turn, and neither do the coordinates that a shader of
- * your own reads. Changes `quaternion`, or `matrix` alone if that is not of `position`, `quaternion` and `scale`, and turns
- * the children to stay where they are. To animate a mesh, put it into a group, and animate that.
+ * Changes the geometry: `position`, `normal` and `tangent` are new attributes of single precision, and it is no longer of
+ * parameters. Clone it first if meshes beyond the scene have it, too. Vectors in other attributes do not turn, and neither
+ * do the coordinates that a shader of your own reads. Changes `quaternion`, or `matrix` alone if that is not of `position`,
+ * `quaternion` and `scale`, and moves the children into a `Group`, so that they stay where they are, also in animations. To
+ * animate the mesh itself, put it into a group, and animate that. A search that is aborted leaves the mesh turned.
  *
  * Rejects what would look different or fall behind: `SkinnedMesh`, `InstancedMesh`, `BatchedMesh` and anything else than a
  * mesh (`TypeError`); a geometry with a `boundsTree` or of two objects of the scene; a normal map in the geometry's axes; a
@@ -114,11 +120,18 @@ export function costOf(meshBVH: MeshBVH): Promise<number>;
  * the better one.
  *
  * @example
- * const { boxes, triangles } = countTests(mesh.geometry.boundsTree, ray); // in the mesh's own coordinates
+ * const { boxes, triangles } = countTests(tree.toMeshBVH(mesh.geometry), ray); // in the mesh's own coordinates
  */
-export function countTests(meshBVH: MeshBVH, ray: Ray, options?: {
+export function countTests(meshBVH: MeshBVH, ray: Ray, options: CountOptions & { query: 'raycast' }): {
+    hit: Intersection[]; boxes: number; triangles: number;
+};
+export function countTests(meshBVH: MeshBVH, ray: Ray, options?: CountOptions & { query?: 'raycastFirst' }): {
+    hit: Intersection | null; boxes: number; triangles: number;
+};
+
+/** What `countTests` hands on to `raycastFirst` or `raycast`. */
+export interface CountOptions {
     side?: Side | Material | Material[];
     near?: number;
     far?: number;
-    query?: 'raycastFirst' | 'raycast';
-}): { hit: Intersection | Intersection[] | null; boxes: number; triangles: number };
+}

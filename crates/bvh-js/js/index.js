@@ -2,13 +2,18 @@ import { MeshBVH } from 'three-mesh-bvh';
 import * as wasm from '../wasm/bvh_js.js';
 import { fingerprint, reorder, reordered, restored, triangleCount, triangles } from './geometry.js';
 import { checkMesh, turn } from './orient.js';
+import { checkNames } from './options.js';
 import { load } from '#load';
 import { startWorker } from '#worker';
 
 export { countTests } from './tests.js';
 
 let loaded;
-const ready = () => (loaded ??= load());
+// After a failure, such as of the network, the next call tries again.
+const ready = () => (loaded ??= load().catch((error) => {
+    loaded = undefined;
+    throw error;
+}));
 
 /** A tree over the triangles of a geometry. */
 export class Tree {
@@ -184,12 +189,6 @@ function follower(onProgress, fail) {
         const answer = onProgress(Number.isNaN(cost) ? { fraction } : { fraction, cost });
         if (typeof answer?.then === 'function') answer.then(undefined, fail);
     });
-}
-
-function checkNames(options, accepted) {
-    if (typeof options !== 'object' || options === null) throw new TypeError(`options is ${options}; accepted: an object`);
-    const other = Object.keys(options).find((name) => !accepted.includes(name));
-    if (other !== undefined) throw new TypeError(`option "${other}"; accepted: ${accepted.join(', ')}`);
 }
 
 function checked(options, more = []) {

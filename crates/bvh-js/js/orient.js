@@ -1,5 +1,5 @@
 // Turns the geometry of a mesh to other axes, and the mesh back.
-import { BufferAttribute, Matrix4, ObjectSpaceNormalMap, Quaternion } from 'three';
+import { BufferAttribute, Group, Matrix4, ObjectSpaceNormalMap, Quaternion } from 'three';
 
 /** Rejects what would look different after the turn. */
 export function checkMesh(mesh) {
@@ -7,7 +7,7 @@ export function checkMesh(mesh) {
         const kind = mesh?.type ? `a ${mesh.type}` : String(mesh);
         throw new TypeError(`mesh is ${kind}; accepted: a Mesh`);
     }
-    const { geometry, material, scale, children } = mesh;
+    const { geometry, material, scale } = mesh;
     for (const [kind, places] of [['SkinnedMesh', 'bones'], ['InstancedMesh', 'matrices'], ['BatchedMesh', 'matrices']]) {
         if (mesh[`is${kind}`]) {
             throw new TypeError(`mesh is of type ${kind}, whose ${places} place its vertices; accepted: a Mesh without them`);
@@ -23,9 +23,7 @@ export function checkMesh(mesh) {
     if ([material].flat().some((one) => one?.normalMap && one.normalMapType === ObjectSpaceNormalMap)) {
         throw new Error('the material has a normal map in the axes of the geometry; accepted: one in tangent space');
     }
-    if ([mesh, ...children].some(({ pivot }) => pivot)) {
-        throw new Error('the mesh or a child has a pivot; accepted: objects that turn about their position');
-    }
+    if (mesh.pivot) throw new Error('the mesh has a pivot; accepted: a mesh that turns about its position');
     if (mesh.matrixAutoUpdate && !isUniform(scale)) {
         throw new Error(`mesh.scale is ${scale.toArray().join(', ')}; accepted: the same factor along all axes, or `
             + 'matrixAutoUpdate = false, for a matrix that is no longer of a position, a quaternion and a scale');
@@ -69,15 +67,14 @@ export function turn(mesh, found) {
     // Rays that are cast before the next frame need it.
     mesh.matrixWorld.multiply(inverse);
     mesh.matrixWorldNeedsUpdate = true;
-    for (const child of mesh.children) {
-        if (isComposed(child)) {
-            child.position.applyMatrix4(rotation);
-            child.quaternion.premultiply(new Quaternion().setFromRotationMatrix(rotation));
-            child.updateMatrix();
-        } else {
-            child.matrix.premultiply(rotation);
-        }
-        child.matrixWorldNeedsUpdate = true;
+    if (mesh.children.length > 0) {
+        // Children, and clips that move them, stay in the old axes.
+        const group = new Group();
+        group.quaternion.setFromRotationMatrix(rotation);
+        group.add(...mesh.children);
+        mesh.add(group);
+        group.updateMatrix();
+        group.matrixWorld.multiplyMatrices(mesh.matrixWorld, group.matrix);
     }
     return { turned: true, gain };
 }
@@ -88,6 +85,9 @@ function isComposed({ matrixAutoUpdate, matrix, position, quaternion, scale }) {
 }
 
 function turnGeometry(geometry, rotation) {
+    // A geometry of parameters would be saved as these, unturned.
+    geometry.type = 'BufferGeometry';
+    delete geometry.parameters;
     for (const name of ['position', 'normal', 'tangent']) {
         const attribute = geometry.attributes[name];
         if (attribute) geometry.setAttribute(name, turnedAttribute(attribute, rotation));

@@ -1,4 +1,5 @@
 import { Ray, Vector3 } from 'three';
+import { checkNames } from './options.js';
 
 const plain = new Ray();
 let boxes = 0;
@@ -35,7 +36,11 @@ class CountingOrigin extends Vector3 {
 
 const counting = new CountingRay();
 
-export function countTests(meshBVH, ray, { side, near, far, query = 'raycastFirst' } = {}) {
+export function countTests(meshBVH, ray, options = {}) {
+    checkNames(options, ['side', 'near', 'far', 'query']);
+    const { side, near, far, query = 'raycastFirst' } = options;
+    if (typeof meshBVH?.raycastFirst !== 'function') throw new TypeError('meshBVH is another object; accepted: a MeshBVH');
+    if (!(ray?.origin && ray.direction)) throw new TypeError('ray is another object; accepted: a Ray, as raycaster.ray');
     if (!/^raycast(First)?$/.test(query)) throw new TypeError(`query is "${query}"; accepted: raycastFirst, raycast`);
     plain.copy(ray);
     counting.origin.y = ray.origin.y;
