@@ -201,8 +201,8 @@ impl DRay {
 /// A ray through an edge or a corner of a solid meets several closed triangles there, and may only
 /// touch the solid. Of a given side, only *crossings* count, by the rule of
 /// [`Triangle::crossing`](crate::Triangle::crossing): from a point outside, a closed surface is left as
-/// often as it is entered, from a point inside once more. A point on the surface counts as one just
-/// behind it on the line of that rule. So a ray that lies in a face may count as outside.
+/// often as it is entered, from a point inside once more. A ray from a point on the surface counts as
+/// if it began just before it, on the moved line. So one along a face may count as outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Orientation {
     /// Either side.

@@ -8,7 +8,10 @@ export interface BakeOptions {
      * about ten seconds for fifty thousand.
      */
     seconds?: number | undefined;
-    /** How much to search, in nodes visited: the same tree on every machine, as of `bvh bake --for three-mesh-bvh --budget 50Mwork`. */
+    /**
+     * How much to search, in nodes visited: the same tree on every machine, that of `bvh bake --for three-mesh-bvh --budget
+     * 50Mwork` or the greedy one.
+     */
     work?: number | undefined;
     /** Seed of the random numbers. */
     seed?: number | undefined;
@@ -59,11 +62,13 @@ export class Tree {
 
 /**
  * Searches the best tree of a geometry in this thread. Where rays would take more tests in it than in a greedy tree, as in
- * some smooth meshes, gives the greedy tree; this is counted where it takes at most a quarter of the time. The tree has the
- * triangles of the draw range, also those in gaps between groups, which three.js draws with a single material only.
+ * some smooth meshes, gives the greedy tree; this is counted where it takes at most a quarter of `seconds`, without them at
+ * most a second. The tree has the triangles of the draw range, also those in gaps between groups, which three.js draws with
+ * a single material only.
  *
- * The first tree takes a second for a million triangles, whatever `seconds` is. The memory of this thread's WebAssembly
- * stays, 0.5 kB per triangle of the largest mesh; that of `bakeInWorker` goes back.
+ * The greedy tree that a search begins with takes a second for a million triangles, whatever `seconds` is. The memory of
+ * this thread's WebAssembly stays, 0.4 to 0.7 kB per triangle of the largest mesh, 1.5 with `references`; that of
+ * `bakeInWorker` goes back.
  *
  * Rejects a geometry without triangles, with an index beyond its vertices (`RangeError`), with coordinates that are not
  * finite (`RangeError`), with morph targets or skin weights, and anything else than a geometry (`TypeError`).
@@ -78,7 +83,7 @@ export function bake(geometry: BufferGeometry, options?: BakeOptions & { orient?
 export function bake(mesh: Mesh, options: BakeOptions & { orient: true }): Promise<Tree>;
 
 /**
- * Searches as `bake` does in a worker, so that the page stays alive. `signal` ends it.
+ * Searches as `bake` does in a worker, so that the page stays alive. `signal` ends it; after `orient`, the mesh stays turned.
  *
  * @example
  * const stop = new AbortController(); // stop.abort() ends the search, and the promise rejects
@@ -95,14 +100,14 @@ export function bakeInWorker(mesh: Mesh, options: BakeOptions & { orient: true; 
  * that a tree saves, in a sample of the triangles. Where no other axes certainly save some, `turned` is false, `gain` is 0,
  * and nothing changes. The same on every machine; takes a second or two.
  *
- * Changes the geometry: `position`, `normal` and `tangent` are new attributes of single precision, and it is no longer of
- * parameters. Clone it first if meshes beyond the scene have it, too. Vectors in other attributes do not turn, and neither
+ * Changes the geometry: `position`, `normal` and `tangent` are new attributes of single precision, its
+ * `parameters` go, and its `type` is `BufferGeometry`. Clone it first if meshes beyond the scene have it, too. Vectors in other attributes do not turn, and neither
  * do the coordinates that a shader of your own reads. Changes `quaternion`, or `matrix` alone if that is not of `position`,
  * `quaternion` and `scale`, and moves the children into a `Group`, so that they stay where they are, also in animations. To
- * animate the mesh itself, put it into a group, and animate that. A search that is aborted leaves the mesh turned.
+ * animate the mesh itself, put it into a group, and animate that.
  *
  * Rejects what would look different or fall behind: `SkinnedMesh`, `InstancedMesh`, `BatchedMesh` and anything else than a
- * mesh (`TypeError`); a geometry with a `boundsTree` or of two objects of the scene; a normal map in the geometry's axes; a
+ * mesh (`TypeError`); an `InstancedBufferGeometry`, a `pivot`; a geometry with a `boundsTree` or of two objects of the scene; a normal map in the geometry's axes; a
  * scale that is not the same along all axes, up to signs, unless `matrixAutoUpdate` is false; and the geometries that
  * `bake` rejects.
  *

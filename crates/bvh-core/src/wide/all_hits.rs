@@ -4,8 +4,8 @@
 //!
 //! The hits are the crossings of [`Triangle::crossing`](crate::Triangle::crossing), in real
 //! arithmetic. A ray through an edge or a corner meets several closed triangles there; the rule
-//! counts it as if its origin were moved by (ε, ε², ε³) with an infinitely small ε > 0 (a *symbolic
-//! perturbation*). With `o` the origin, `d` the direction and `P`, `Q` the ends of an edge relative
+//! counts those that its line would cross if it were moved by (ε, ε², ε³) with an infinitely small
+//! ε > 0 (a *symbolic perturbation*). With `o` the origin, `d` the direction and `P`, `Q` the ends of an edge relative
 //! to `o`, the side of the edge on which the moved line is follows from the sign of
 //!
 //! ```text
