@@ -61,6 +61,11 @@ pub fn share_axes(panels: &mut [Panel]) {
 }
 
 impl<'a> Ruled<'a> {
+    /// Whether the axis is of named rows.
+    pub fn is_rows(&self) -> bool {
+        matches!(self.axis.scale, Scale::Rows(..))
+    }
+
     /// Chooses the shown part of `axis`: its own range if it has one, otherwise all `values` with a
     /// margin of `margin` times their extent.
     fn new(axis: &'a Axis, values: &[f64], margin: f64) -> Self {

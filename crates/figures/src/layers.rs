@@ -94,8 +94,9 @@ impl Layers<'_> {
             _ => None,
         });
         let count: usize = with_points.clone().map(|(_, points)| points.len()).sum();
-        // Many large points would hide each other.
-        let (radius, edge) = if count < 100 { (5.0, 1.0) } else { (2.5, 0.3) };
+        // Many large points would hide each other; those of rows stand apart.
+        let many = if self.y.is_rows() { 300 } else { 100 };
+        let (radius, edge) = if count < many { (5.0, 1.0) } else { (2.5, 0.3) };
         let shown = |at: &Point| Some((self.x.shown(at.0)?, self.y.shown(at.1)?));
         for (name, points) in with_points {
             for at in points.iter().filter_map(shown) {
