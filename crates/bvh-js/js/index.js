@@ -2,7 +2,7 @@ import { MeshBVH } from 'three-mesh-bvh';
 import * as wasm from '../wasm/bvh_js.js';
 import { fingerprint, reorder, reordered, restored, triangleCount, triangles } from './geometry.js';
 import { checkMesh, turn } from './orient.js';
-import { checkNames } from './options.js';
+import { checked, checkNames } from './options.js';
 import { load } from '#load';
 import { startWorker } from '#worker';
 
@@ -189,29 +189,6 @@ function follower(onProgress, fail) {
         const answer = onProgress(Number.isNaN(cost) ? { fraction } : { fraction, cost });
         if (typeof answer?.then === 'function') answer.then(undefined, fail);
     });
-}
-
-function checked(options, more = []) {
-    checkNames(options, ['seconds', 'work', 'seed', 'references', 'orient', 'onProgress', ...more]);
-    const { seconds, work, seed = 1, references = 1, orient: orients = false, onProgress, signal } = options;
-    const check = (name, value, accepted, isAccepted) => {
-        if (value !== undefined && !(typeof value === 'number' && isAccepted(value))) {
-            const found = typeof value === 'string' ? `"${value}"` : value;
-            throw new RangeError(`${name} is ${found}; accepted: ${accepted}`);
-        }
-    };
-    check('seconds', seconds, 'a number above 0', (value) => value > 0);
-    check('work', work, 'a whole number above 0, below 2^53', (value) => value > 0 && Number.isSafeInteger(value));
-    check('seed', seed, 'a whole number from 0 on, below 2^53', (value) => value >= 0 && Number.isSafeInteger(value));
-    check('references', references, 'a number from 1 to 16', (value) => value >= 1 && value <= 16);
-    if (typeof orients !== 'boolean') throw new TypeError(`orient is ${orients}; accepted: true or false`);
-    if (onProgress !== undefined && typeof onProgress !== 'function') {
-        throw new TypeError(`onProgress is ${onProgress}; accepted: a function`);
-    }
-    if (signal !== undefined && typeof signal?.throwIfAborted !== 'function') {
-        throw new TypeError(`signal is ${signal}; accepted: an AbortSignal`);
-    }
-    return { seconds, work, seed, references, orient: orients };
 }
 
 /** A copy of bytes, whoever holds them. */

@@ -175,14 +175,11 @@ impl Drawing {
             layers.push(Layer::new(&series, Marks::Spans(spans)));
             layers.push(Layer::new(series, Marks::Points(points)));
         }
-        let one_a_name = |(place, values): (usize, Vec<(f64, f64)>)| {
-            let value = values.first().map(|first| first.0);
-            match values.iter().all(|other| Some(other.0) == value) {
-                true => value.map(|value| (value, place as f64)).into_iter().collect(),
-                false => values,
-            }
+        let one_if_equal = |(place, points): (usize, Vec<(f64, f64)>)| {
+            let values = distinct(points.iter().map(|point| point.0));
+            if let [value] = values[..] { vec![(value, place as f64)] } else { points }
         };
-        let beside: Vec<(f64, f64)> = beside.into_iter().flat_map(one_a_name).collect();
+        let beside: Vec<(f64, f64)> = beside.into_iter().flat_map(one_if_equal).collect();
         if !beside.is_empty() {
             layers.push(Layer::new("paper", Marks::Points(beside)));
         }

@@ -76,12 +76,11 @@ pub fn page(headers: &BTreeMap<String, Vec<String>>) -> String {
             let query = queried.get(&(file.clone(), column.clone()));
             let query = query.map(|meaning| (column.clone(), meaning.clone()));
             let declared = || own.into_iter().chain(&runs).find_map(|kind| described(kind, column));
-            let known = query.or_else(declared);
-            let is_told = known.is_some()
-                || own.is_none_or(|kind| !kind.iter().any(|(name, _)| name == column));
-            assert!(is_told, "the rows of {file} have no comment `///` on {column}");
-            if let Some(meaning) = known {
+            if let Some(meaning) = query.or_else(declared) {
                 meanings.entry(meaning).or_default().insert(file);
+            } else {
+                let is_own = own.is_some_and(|kind| kind.iter().any(|(name, _)| name == column));
+                assert!(!is_own, "the rows of {file} have no comment `///` on {column}");
             }
         }
     }
