@@ -215,6 +215,16 @@ pub enum Orientation {
     Entering,
 }
 
+impl Orientation {
+    fn admits(self, side: impl FnOnce() -> i32) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Exiting => side() > 0,
+            Self::Entering => side() < 0,
+        }
+    }
+}
+
 /// Which hits of a ray count.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Select<'a> {
@@ -244,12 +254,7 @@ impl<'a> Select<'a> {
     /// Returns whether a hit counts on a triangle that the ray crosses from a
     /// [side](Line::crossed_side).
     fn admits(&self, object: u32, side: impl FnOnce() -> i32) -> bool {
-        !self.exclude.contains(&object)
-            && match self.orientation {
-                Orientation::Any => true,
-                Orientation::Exiting => side() > 0,
-                Orientation::Entering => side() < 0,
-            }
+        !self.exclude.contains(&object) && self.orientation.admits(side)
     }
 
     /// Returns those of some hits that are of the orientation, by the bits of those along the normal.
@@ -394,6 +399,9 @@ impl Query<'_> {
 
     /// Takes a triangle, decided by itself. Returns whether it is the new nearest hit.
     pub(crate) fn offer(&self, nearest: &mut NearestHit, object: u32) -> bool {
+        if self.select.exclude.contains(&object) {
+            return false;
+        }
         let Some(bounds) = self.bounds(object) else { return false };
         self.take(nearest, NearestHit::between(bounds, object))
     }
@@ -464,18 +472,21 @@ impl Query<'_> {
         hit.high = hit.low;
     }
 
-    /// Returns bounds of the distance at which the ray hits a triangle, without its range.
+    /// Returns bounds of the distance at which the ray hits a triangle, without its range. Where they
+    /// take exact arithmetic, triangles of the other side have none.
     #[cold]
     #[inline(never)]
     pub(crate) fn bounds(&self, object: u32) -> Option<(f64, f64)> {
         let DTriangle(corners) = &self.triangles[object as usize];
-        match self.ray.line().filter(corners) {
+        let line = self.ray.line();
+        match line.filter(corners) {
             Verdict::Miss => None,
             Verdict::Between(low, high) => Some((low, high)),
-            Verdict::Unsure => {
-                let t = self.ray.line().crossing(corners, false)?;
+            Verdict::Unsure if self.select.orientation.admits(|| line.side(corners)) => {
+                let t = line.crossing(corners, false)?;
                 Some((t, t))
             }
+            Verdict::Unsure => None,
         }
     }
 }

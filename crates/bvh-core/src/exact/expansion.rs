@@ -10,6 +10,8 @@
 //! predicates', theorems 6 (Knuth's sum), 10 (grow-expansion), 18 (Dekker's product); zero terms
 //! are eliminated as in section 2.3.
 
+use super::quotient::Twice;
+
 /// An exact number: the sum of at most `N` terms.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expansion<const N: usize> {
@@ -103,17 +105,16 @@ impl<const N: usize> Expansion<N> {
 }
 
 impl Expansion<2> {
-    pub(super) fn difference(a: f64, b: f64) -> Self {
-        let (sum, rest) = two_sum(a, -b);
-        let mut difference = Self::zero();
-        // The rounding error is never adjacent to the sum.
+    /// Returns a sum and its rounding error, which is never adjacent to it.
+    pub(super) fn of(Twice(sum, rest): Twice<f64>) -> Self {
+        let mut both = Self::zero();
         for term in [rest, sum] {
             if term != 0.0 {
-                difference.terms[difference.len] = term;
-                difference.len += 1;
+                both.terms[both.len] = term;
+                both.len += 1;
             }
         }
-        difference
+        both
     }
 }
 

@@ -32,11 +32,13 @@
 //! ```text
 //!   f64           sheared corners, error bound    nearly all triangles   ──> miss, or rounded distance
 //!    │ perhaps
+//!   twice f64     compensated sums, error bound   near edges and corners ──> side, or rounded distance
+//!    │ perhaps
 //!   expansions    exact                           what remains           ──> miss, or rounded distance
 //! ```
 //!
-//! The first layer answers only where its error bound proves the answer. It could be omitted, or
-//! computed with other roundings, and no answer would change.
+//! The first two layers answer only where their error bounds prove the answer. They could be omitted,
+//! or computed with other roundings, and no answer would change.
 //!
 //! # The bounds
 //!
@@ -86,7 +88,7 @@ mod volumes;
 use glam::DVec3;
 pub(crate) use number::{Number, Point};
 pub(crate) use quotient::{Numbers, Twice, distance};
-use volumes::Volumes;
+use volumes::{Volumes, difference};
 
 /// The axes of the shear, indexed by the axis of the direction's largest component.
 pub(crate) static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
@@ -220,25 +222,26 @@ impl Line {
     /// [`Triangle::crossing`](crate::Triangle::crossing): 1 along the normal, −1 against it, and 0 if it
     /// does not.
     pub(crate) fn crossed_side<P: Point>(&self, triangle: &[P; 3]) -> i32 {
+        let side = self.side(triangle);
         let is_crossed = match self.filter(triangle) {
             Verdict::Miss => false,
             Verdict::Between(..) => true,
-            Verdict::Unsure => self.distance(triangle, true).is_some(),
+            Verdict::Unsure => side != 0 && self.distance(triangle, true).is_some(),
         };
-        if is_crossed { self.side(triangle) } else { 0 }
+        if is_crossed { side } else { 0 }
     }
 
     /// Returns the side from which the line comes to a triangle that it crosses: 1 along the normal,
     /// −1 against it, and 0 for a line parallel to its plane.
     #[inline]
-    fn side<P: Point>(&self, triangle: &[P; 3]) -> i32 {
+    pub(crate) fn side<P: Point>(&self, triangle: &[P; 3]) -> i32 {
         let [first, second, third] = *triangle;
         let (normal, products) = normal(&self.edge(first, second), &self.edge(first, third));
         let along = dot(&self.direction, &normal);
         if ERROR * dot(&self.direction.map(f64::abs), &products) < along.abs() {
             return if along > 0.0 { 1 } else { -1 };
         }
-        Volumes::new(self, triangle).map_or(0, |volumes| volumes.speed().sign())
+        Volumes::new(self, triangle).map_or(0, |volumes| volumes.facing())
     }
 
     /// Returns the distance of the plane of a triangle that the line crosses at or in front of the
@@ -249,9 +252,9 @@ impl Line {
         triangle: &[P; 3],
     ) -> f64 {
         let [a, b, c] = triangle.map(P::double);
-        let minus = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|i| Twice::difference(p[i], q[i]));
-        let corner = minus(a, origin.double());
-        let [low, high] = distance(corner, direction.double(), minus(b, a), minus(c, a), None);
+        let corner = difference(a, origin.double());
+        let sides = [difference(b, a), difference(c, a)];
+        let [low, high] = distance(corner, direction.double(), sides[0], sides[1], None);
         if low == high {
             return low + 0.0;
         }
@@ -288,7 +291,9 @@ impl Line {
                 *side = volumes.moved_side(edge);
             }
         }
-        if sides.contains(&-1) && sides.contains(&1) || is_moved && sides.contains(&0) {
+        let [low, high] = sides.iter().fold([0, 0], |[low, high], &s| [s.min(low), s.max(high)]);
+        // A line in the triangle's plane is on no side of any edge.
+        if low == high || low < 0 && high > 0 || is_moved && sides.contains(&0) {
             return None;
         }
         match rounded(verdict) {

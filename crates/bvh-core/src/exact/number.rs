@@ -7,6 +7,9 @@ pub(crate) trait Number: Copy + PartialEq + PartialOrd {
     /// Rounds to the nearest number, ties to even.
     fn rounded(x: f64) -> Self;
 
+    /// Rounds a number that was rounded to f64 before, unless the bits that are lost could decide.
+    fn rounded_again(x: f64) -> Option<Self>;
+
     fn double(self) -> f64;
 
     fn next_up(self) -> Self;
@@ -25,6 +28,12 @@ macro_rules! number {
             #[inline(always)]
             fn rounded(x: f64) -> Self {
                 x as Self
+            }
+
+            fn rounded_again(x: f64) -> Option<Self> {
+                let [below, above] = [x.next_down(), x.next_up()].map(|x| x as Self);
+                let is_f64 = size_of::<Self>() == size_of::<f64>();
+                (is_f64 || below == above).then_some(x as Self)
             }
 
             #[inline(always)]

@@ -28,6 +28,9 @@
 //! numbers are 0, when A · n is. Infinite numbers, of what overflows or of s = 0, make NaN of a sum.
 //! What underflows is below 2⁻⁸²⁰ / |s|, and N at least 2⁻⁶¹⁰, unless t₀ is 0, or has the few bits of
 //! bounds in f32, when nothing does.
+//!
+//! The [signs](sign) of d · n and A · n follow from the same sums with d or A for P, whose small parts
+//! are smaller: they are off by less than 118ε²M or 118ε²N, and nothing underflows.
 
 use super::expansion::two_product;
 use core::ops::{Add, Div, Mul, Sub};
@@ -76,7 +79,13 @@ impl Numbers for f64 {
 
 /// A number as the sum of a large and a small part.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Twice<D>(D, D);
+pub(crate) struct Twice<D>(pub(super) D, pub(super) D);
+
+impl Twice<f64> {
+    pub(super) fn of(number: f64) -> Self {
+        Self(number, 0.0)
+    }
+}
 
 impl<D: Numbers> Twice<D> {
     /// The exact sum of two numbers (Knuth).
@@ -121,29 +130,9 @@ fn dot<D: Numbers>(a: [D; 3], b: [D; 3]) -> D {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
 
-/// Returns two bounds of the distance A · n / d · n of the plane with the normal n = p × q: the corner
-/// A and the sides p, q, exactly, and the direction d, which is not parallel to the plane. If they
-/// are equal, that is the distance, rounded once. `nearly` is a number close to it, 0 or a
-/// normal one, if one is known already: of a subnormal one the bounds would lose their slack.
+/// Returns n · p, where the small part of the last products is left out.
 #[inline(always)]
-pub(crate) fn distance<D: Numbers>(
-    [ax, ay, az]: [Twice<D>; 3],
-    [dx, dy, dz]: [D; 3],
-    [px, py, pz]: [Twice<D>; 3],
-    [qx, qy, qz]: [Twice<D>; 3],
-    nearly: Option<D>,
-) -> [D; 2] {
-    let (x, x_size) = determinant(py, qz, pz, qy);
-    let (y, y_size) = determinant(pz, qx, px, qz);
-    let (z, z_size) = determinant(px, qy, py, qx);
-    let normal = [x.0, y.0, z.0];
-    let sizes = [x_size, y_size, z_size];
-    let inverse = dot([dx, dy, dz], normal).inverse();
-    let t = match nearly {
-        Some(t) => t,
-        None => dot([ax.0, ay.0, az.0], normal) * inverse,
-    };
-    let [px, py, pz] = [ax.beyond(t, dx), ay.beyond(t, dy), az.beyond(t, dz)];
+fn dot_twice<D: Numbers>([x, y, z]: [Twice<D>; 3], [px, py, pz]: [Twice<D>; 3]) -> Twice<D> {
     let (first, first_rest) = px.0.two_product(x.0);
     let (second, second_rest) = py.0.two_product(y.0);
     let (third, third_rest) = pz.0.two_product(z.0);
@@ -152,7 +141,51 @@ pub(crate) fn distance<D: Numbers>(
     // What is known first is added first.
     let small = dot([x.1, y.1, z.1], [px.0, py.0, pz.0]);
     let small = x.0.mul_add(px.1, y.0.mul_add(py.1, z.0.mul_add(pz.1, small)));
-    let small = ((two_rest + rest) + (first_rest + second_rest + third_rest)) + small;
+    Twice(large, ((two_rest + rest) + (first_rest + second_rest + third_rest)) + small)
+}
+
+/// Returns p × q, and the sums of the absolute products.
+#[inline(always)]
+fn cross<D: Numbers>(
+    [px, py, pz]: [Twice<D>; 3],
+    [qx, qy, qz]: [Twice<D>; 3],
+) -> ([Twice<D>; 3], [D; 3]) {
+    let (x, x_size) = determinant(py, qz, pz, qy);
+    let (y, y_size) = determinant(pz, qx, px, qz);
+    let (z, z_size) = determinant(px, qy, py, qx);
+    ([x, y, z], [x_size, y_size, z_size])
+}
+
+/// Returns the sign of a · (p × q), 0 if the bound leaves it open.
+pub(super) fn sign(a: [Twice<f64>; 3], p: [Twice<f64>; 3], q: [Twice<f64>; 3]) -> i32 {
+    let (normal, sizes) = cross(p, q);
+    let Twice(large, small) = dot_twice(normal, a);
+    let value = large + small;
+    let slack = dot(a.map(|x| x.0.abs()), sizes) * (1.0 / (1_u128 << 99) as f64);
+    i32::from(value > slack) - i32::from(value < -slack)
+}
+
+/// Returns two bounds of the distance A · n / d · n of the plane with the normal n = p × q: the corner
+/// A and the sides p, q, exactly, and the direction d, which is not parallel to the plane. If they
+/// are equal, that is the distance, rounded once; if not, they may both be off. `nearly` is a number close to it, 0 or a
+/// normal one, if one is known already: of a subnormal one the bounds would lose their slack.
+#[inline(always)]
+pub(crate) fn distance<D: Numbers>(
+    [ax, ay, az]: [Twice<D>; 3],
+    [dx, dy, dz]: [D; 3],
+    p: [Twice<D>; 3],
+    q: [Twice<D>; 3],
+    nearly: Option<D>,
+) -> [D; 2] {
+    let ([x, y, z], sizes) = cross(p, q);
+    let normal = [x.0, y.0, z.0];
+    let inverse = dot([dx, dy, dz], normal).inverse();
+    let t = match nearly {
+        Some(t) => t,
+        None => dot([ax.0, ay.0, az.0], normal) * inverse,
+    };
+    let place = [ax.beyond(t, dx), ay.beyond(t, dy), az.beyond(t, dz)];
+    let Twice(large, small) = dot_twice([x, y, z], place);
     let change = (large + small) * inverse;
     let inverse = inverse.abs();
     let height = dot([ax.0.abs(), ay.0.abs(), az.0.abs()], sizes) * inverse;

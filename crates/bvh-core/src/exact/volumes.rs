@@ -1,18 +1,21 @@
-//! The exact values that decide whether a ray hits a triangle, as expansions.
+//! The exact values that decide whether a ray hits a triangle: in twice f64 where that suffices,
+//! otherwise as expansions.
 
 use super::expansion::Expansion;
+use super::quotient::{self, Twice};
 use super::{Line, Number, Point};
 
 /// An exact difference of two points.
+type Difference = [Twice<f64>; 3];
+/// The same as expansions.
 type Vector = [Expansion<2>; 3];
 
-#[inline]
-fn difference(p: [f64; 3], q: [f64; 3]) -> Vector {
-    let mut vector = [Expansion::zero(); 3];
-    for (axis, component) in vector.iter_mut().enumerate() {
-        *component = Expansion::difference(p[axis], q[axis]);
-    }
-    vector
+pub(super) fn difference(p: [f64; 3], q: [f64; 3]) -> Difference {
+    [0, 1, 2].map(|axis| Twice::difference(p[axis], q[axis]))
+}
+
+fn exact(difference: Difference) -> Vector {
+    difference.map(Expansion::of)
 }
 
 /// Adds one component of the exact cross product. Returned products would be copied from function to
@@ -29,7 +32,7 @@ pub(super) struct Volumes {
     direction: [f64; 3],
     triangle: [[f64; 3]; 3],
     /// The corners relative to the origin.
-    corners: [Vector; 3],
+    corners: [Difference; 3],
 }
 
 /// The first and the second corner of the edges `u`, `v`, `w`.
@@ -48,21 +51,41 @@ impl Volumes {
 
     /// Returns the side of an edge on which the ray is: −1, 0 or 1.
     pub(super) fn side(&self, edge: usize) -> i32 {
-        let [first, second] = EDGES[edge];
-        let mut volume: Expansion<96> = Expansion::zero();
+        let [first, second] = EDGES[edge].map(|corner| self.corners[corner]);
+        self.volume(first, second)
+    }
+
+    /// Returns the side from which the ray comes to the triangle: the sign of d · n.
+    pub(super) fn facing(&self) -> i32 {
+        let [a, b, c] = self.triangle;
+        self.volume(difference(b, a), difference(c, a))
+    }
+
+    /// Returns the sign of d · (p × q).
+    fn volume(&self, p: Difference, q: Difference) -> i32 {
+        match quotient::sign(self.direction.map(Twice::of), p, q) {
+            0 => self.along(&exact(p), &exact(q)).sign(),
+            sign => sign,
+        }
+    }
+
+    /// Returns d · (p × q).
+    #[inline(always)]
+    fn along(&self, p: &Vector, q: &Vector) -> Expansion<96> {
+        let mut volume = Expansion::zero();
         for axis in 0..3 {
             let mut normal = Expansion::zero();
-            add_cross(&mut normal, &self.corners[first], &self.corners[second], axis);
+            add_cross(&mut normal, p, q, axis);
             volume.add_scaled(&normal, self.direction[axis]);
         }
-        volume.sign()
+        volume
     }
 
     /// Returns the side of an edge on which the ray is after its origin has moved by (ε, ε², ε³) with
     /// an infinitely small ε > 0, if it was on none: 0 only for an edge that is parallel to it.
     pub(super) fn moved_side(&self, edge: usize) -> i32 {
         let [first, second] = EDGES[edge];
-        let edge = difference(self.triangle[second], self.triangle[first]);
+        let edge = exact(difference(self.triangle[second], self.triangle[first]));
         [(1, 2), (2, 0), (0, 1)]
             .into_iter()
             .map(|(i, j)| {
@@ -75,32 +98,31 @@ impl Volumes {
             .unwrap_or(0)
     }
 
-    /// Returns d · n, exactly.
-    pub(super) fn speed(&self) -> Expansion<96> {
-        self.plane().1
-    }
-
-    /// Returns the distance of the triangle's plane, rounded once; `None` as [`round_quotient`].
+    /// Returns the distance of the triangle's plane, to which the ray is not parallel, rounded once;
+    /// `None` as [`round_quotient`].
     pub(super) fn rounded_distance<N: Number>(&self) -> Option<N> {
-        let (height, speed) = self.plane();
-        round_quotient(&height, &speed)
-    }
-
-    /// Returns A · n and d · n.
-    #[inline(always)]
-    fn plane(&self) -> (Expansion<192>, Expansion<96>) {
         let [a, b, c] = self.triangle;
-        let to_second = difference(b, a);
-        let to_third = difference(c, a);
-        let mut height = Expansion::zero();
-        let mut speed = Expansion::zero();
-        for axis in 0..3 {
-            let mut normal = Expansion::zero();
-            add_cross(&mut normal, &to_second, &to_third, axis);
-            height.add_product(&normal, &self.corners[0][axis], 1.0);
-            speed.add_scaled(&normal, self.direction[axis]);
+        let [p, q] = [difference(b, a), difference(c, a)];
+        let [low, high] = quotient::distance(self.corners[0], self.direction, p, q, None);
+        // Of a distance of 0 the sign decides, and none rounds to infinity.
+        if low == high
+            && 0.0 < low
+            && low < f64::from(f32::MAX)
+            && let Some(distance) = N::rounded_again(low)
+        {
+            return Some(distance);
         }
-        (height, speed)
+        if quotient::sign(self.corners[0], p, q) * self.volume(p, q) < 0 {
+            return None;
+        }
+        let [corner, p, q] = [self.corners[0], p, q].map(exact);
+        let mut height = Expansion::zero();
+        for (axis, component) in corner.iter().enumerate() {
+            let mut normal = Expansion::zero();
+            add_cross(&mut normal, &p, &q, axis);
+            height.add_product(&normal, component, 1.0);
+        }
+        round_quotient(&height, &self.along(&p, &q))
     }
 }
 
@@ -110,7 +132,7 @@ impl Volumes {
 pub(super) fn normal_sign<P: Point>(triangle: &[P; 3], axis: usize) -> i32 {
     let [a, b, c] = triangle.map(P::double);
     let mut normal = Expansion::zero();
-    add_cross(&mut normal, &difference(b, a), &difference(c, a), axis);
+    add_cross(&mut normal, &exact(difference(b, a)), &exact(difference(c, a)), axis);
     normal.sign()
 }
 
