@@ -31,12 +31,6 @@ thread_local! {
 /// Milliseconds between two reports of the progress without an improvement.
 const BETWEEN_REPORTS: f64 = 50.0;
 
-/// The rays that [`Target::fit_better`] casts through each of two trees.
-const RAYS: f64 = 8192.0;
-
-/// Tests of boxes and triangles in a millisecond, where every one waits for memory.
-const TESTS: f64 = 20_000.0;
-
 /// Follows a search by JavaScript's clock and function.
 struct Watch {
     start: f64,
@@ -131,17 +125,17 @@ fn search(bake: &Bake, mut watch: Watch) -> Result<Array, JsValue> {
     let greedy = bake.greedy(&watch).map_err(error)?;
     let mut comparison = f64::INFINITY;
     if let Some(tree) = &greedy {
-        // Of many equal triangles, every ray meets all.
-        let cost = TARGET.cost(&TARGET.fit(tree));
-        comparison = 2.0 * RAYS * cost / TESTS;
+        comparison = 1000.0 * TARGET.comparison_seconds(tree);
         // All trees of whole triangles have the same area of leaves.
         if bake.references == 1.0 {
+            let cost = TARGET.cost(&TARGET.fit(tree));
             let root = tree.root_aabb().map_or(0.0, |root| root.half_area());
             let added = TARGET.constants.traversal() / root;
             watch.estimate = [cost - added * internal_area(tree), added];
         }
     }
-    let is_compared = comparison <= 0.25 * watch.limit.unwrap_or(4000.0);
+    // Of many equal triangles, every ray meets all.
+    let is_compared = watch.limit.is_none_or(|limit| comparison <= 0.25 * limit);
     if is_compared {
         watch.limit = watch.limit.map(|limit| limit - comparison);
     }

@@ -80,7 +80,8 @@ pub struct BakeArgs {
     #[arg(value_parser = named([("single", Precision::Single), ("double", Precision::Double)]))]
     pub precision: Option<Precision>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
-    /// and with as many references as pay there.
+    /// and with as many references as pay there. Where rays take fewer tests in the greedy tree, as in
+    /// some smooth meshes, that one is kept.
     #[arg(long = "for", value_name = "TRACER", conflicts_with_all = ["rays", "parts"])]
     #[arg(value_parser = named(Target::ALL.map(|target| (target.name, target))))]
     pub tracer: Option<Target>,
@@ -433,6 +434,7 @@ impl BakeArgs {
             objective: self.cost,
             references,
             rays,
+            tracer: self.tracer,
         })
     }
 }

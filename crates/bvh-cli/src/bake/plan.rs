@@ -8,8 +8,9 @@ use crate::arguments;
 use crate::interrupt::{INTERRUPTED, hold, is_interrupted};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
+use bvh_core::export::Target;
 use bvh_core::file::Header;
-use bvh_core::{Bvh, Frame, Node};
+use bvh_core::{Bvh, Frame, Node, Triangle};
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
@@ -20,6 +21,7 @@ use bvh_search::{
 use glam::DMat3;
 use std::path::Path;
 use std::sync::OnceLock;
+use std::time::Duration;
 
 /// What is left of a budget of time, over the time for the rays.
 const SHARE: u32 = 4;
@@ -37,6 +39,8 @@ pub struct Plan {
     pub references: f64,
     /// The rays whose visits replace areas.
     pub rays: Option<Rays>,
+    /// The tracer of another library.
+    pub tracer: Option<Target>,
 }
 
 /// Returns the size in bytes of the largest file of a tree over a scene with at most so many
@@ -101,6 +105,21 @@ impl Plan {
             budget: self.budget(scene.boxes.len()),
             ..Bake::new(&scene.boxes)
         }
+    }
+
+    /// Returns the tree that is compared with the best one for another tracer, if there is time for
+    /// it, which the search then has less. A method that was asked for gives its own tree.
+    fn rival<'a>(&self, scene: &'a Scene, greedy: &Bvh, watch: &mut Watch) -> Option<Rival<'a>> {
+        let tracer = self.tracer.filter(|_| matches!(self.method, Method::Best(_)))?;
+        let triangles = scene.triangles().ok()?;
+        if let Some(left) = watch.left() {
+            let time = Duration::from_secs_f64(tracer.comparison_seconds(greedy));
+            if time > left / SHARE {
+                return None;
+            }
+            watch.deadline = watch.deadline.sooner(time);
+        }
+        Some(Rival { tracer, greedy: greedy.clone(), triangles })
     }
 
     /// Makes the open choices, prints their reasons, and searches until the budget is spent, or the
@@ -170,18 +189,41 @@ impl Plan {
         let tried = chosen.tried.take();
         let is_tried = tried.is_some();
         let settled = chosen.bake(&bake);
-        let watch = watch.within(settled.budget.max_work);
+        let mut watch = watch.within(settled.budget.max_work);
+        let rival = greedy.as_ref().filter(|_| start.is_none());
+        let rival = rival.and_then(|greedy| self.rival(scene, greedy, &mut watch));
         let baked = match tried {
             Some(tried) => Ok(tried),
             None => settled.search(greedy, &watch),
         };
         watch.bar.finish_and_clear();
-        let baked = baked.map_err(failed)?;
+        let mut baked = baked.map_err(failed)?;
+        if let Some(rival) = rival.filter(|rival| rival.is_better(&baked.outcome.tree)) {
+            let name = rival.tracer.name;
+            let why =
+                format!("greedy, because rays take fewer tests in {name} than in the best tree");
+            answer.line("choices", format!("tree: {why}"));
+            baked.outcome.cost = baked.greedy_cost.unwrap_or(baked.outcome.cost);
+            baked.outcome.tree = rival.greedy;
+        }
         let seconds = watch.deadline.elapsed().as_secs_f64();
         // The work of all bakes that led to this tree, one after the other.
         let work = start.map_or(0, |start| start.work).saturating_add(baked.outcome.work);
         let greedy = Greedy { area, tests };
         Ok(Found { plan: self, scene, chosen, is_tried, baked, greedy, work, seconds })
+    }
+}
+
+/// The tree that a tracer traces if its rays take fewer tests there than in a searched tree.
+struct Rival<'a> {
+    tracer: Target,
+    greedy: Bvh,
+    triangles: &'a [Triangle],
+}
+
+impl Rival<'_> {
+    fn is_better(&self, tree: &Bvh) -> bool {
+        !self.tracer.fit_better(tree, &self.greedy, self.triangles).is_searched()
     }
 }
 

@@ -52,6 +52,41 @@ fn an_export_is_the_fitted_tree_and_says_how_it_compares() {
 }
 
 #[test]
+fn a_bake_for_a_tracer_keeps_the_greedy_tree_where_its_rays_take_fewer_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // A ball of 24 by twelve quads.
+    let angle = |part: usize| std::f64::consts::TAU / 24.0 * part as f64;
+    let mut obj = String::new();
+    for (up, round) in (0..13).flat_map(|up| (0..24).map(move |round| (up, round))) {
+        let [(width, z), (y, x)] = [angle(up), angle(round)].map(f64::sin_cos);
+        obj += &format!("v {} {} {z}\n", width * x, width * y);
+    }
+    for (up, round) in (0..12).flat_map(|up| (0..24).map(move |round| (up, round))) {
+        let at = |up: usize, round: usize| 24 * up + round % 24 + 1;
+        let [a, b] = [at(up, round), at(up, round + 1)];
+        let [c, d] = [at(up + 1, round + 1), at(up + 1, round)];
+        obj += &format!("f {a} {b} {c} {d}\n");
+    }
+    fs::write(at.join("ball.obj"), obj).unwrap();
+    let scene = Scene::load(at.join("ball.obj").to_str().unwrap()).unwrap();
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+    for budget in ["", "--budget=4Mwork"] {
+        let bake = format!("bake ball.obj --for=three-mesh-bvh {budget} --out=x.bvh");
+        let said = bvh(at, &bake);
+        assert!(said.contains("tree: greedy, because rays take fewer tests"), "{said}");
+        let (tree, _) = tree_file::load(&at.join("x.bvh"), &scene).unwrap();
+        assert_eq!(tree, greedy, "{budget}");
+    }
+    // What was searched for, continued or asked for by name is as it was found.
+    bvh(at, "bake ball.obj --budget=1Mwork --out=best.bvh");
+    for asked in ["--from=best.bvh", "--method=goldsmith_salmon"] {
+        let said = bvh(at, &format!("bake ball.obj --for=bvh {asked} --budget=1kwork --out=y.bvh"));
+        assert!(!said.contains("tree: greedy"), "{said}");
+    }
+}
+
+#[test]
 fn an_export_says_in_one_line_what_was_measured_over_the_own_trees_of_the_library() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -9,9 +9,12 @@ use glam::DVec3;
 
 /// The number of rays of each kind. Both trees trace the same rays, so that few suffice.
 const RAYS: u32 = 4096;
-/// The tests after which no more rays are traced: half a second. Where objects are as large as the
-/// scene, fewer rays must do.
-const MOST_TESTS: u64 = 1 << 26;
+/// The tests after which no more rays are traced: a fraction of a second. Where objects are as large
+/// as the scene, fewer rays must do.
+const MOST_TESTS: u64 = 1 << 24;
+
+/// Tests of boxes and triangles in a second, where every one waits for memory.
+const TESTS_PER_SECOND: f64 = 2e7;
 
 /// A tree for a tracer, by [`Target::fit_better`].
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +51,14 @@ impl Target {
         let gains = [theirs[0] / ours[0], theirs[1] / ours[1]];
         let better = Better { tree: searched, gains };
         if better.is_searched() { better } else { Better { tree: own, ..better } }
+    }
+
+    /// Returns about how many seconds [`fit_better`](Self::fit_better) takes for trees like this one,
+    /// if every test waits for memory. O(nodes).
+    pub fn comparison_seconds(&self, tree: &Bvh) -> f64 {
+        let rays = f64::from(2 * RAYS);
+        let tests = 2.0 * rays * self.cost(&self.fit(tree));
+        tests.min(MOST_TESTS as f64) / TESTS_PER_SECOND
     }
 
     /// Returns the costs of all rays of each kind in each of two fitted trees, or of as many as take

@@ -8,6 +8,7 @@ use bvh_core::{
     OutOfExactRange, Select, Solid,
 };
 use glam::{DMat3, DQuat, DVec3};
+use std::slice;
 
 /// Returns scenes in f64 at many places and sizes, turned, with what f32 could not hold.
 fn scenes(random: &mut Random) -> Vec<(String, Vec<DTriangle>)> {
@@ -78,27 +79,30 @@ fn rays(triangles: &[DTriangle], count: usize, random: &mut Random) -> Vec<DRay>
     rays
 }
 
+/// Compares a hit with exact rationals. Returns whether there is one.
+fn check_pair(ray: &DRay, triangle: &DTriangle) -> bool {
+    let found = triangle.intersect(ray);
+    let real = distance([ray.origin(), ray.direction()], triangle.0);
+    let is_right = match &real {
+        Some(real) => found.is_some_and(|t| {
+            let is_even = t.to_bits() & 1 == 0;
+            is_rounded_to(real, [t.next_down(), t, t.next_up()], is_even)
+        }),
+        None => found.is_none(),
+    };
+    assert!(is_right, "{found:?} {real:?} {ray:?} {triangle:?}");
+    found.is_some()
+}
+
 #[test]
 fn hits_and_distances_are_those_of_real_arithmetic_rounded_once() {
     let mut random = Random(31);
     let mut hits = 0;
-    for (name, triangles) in scenes(&mut random) {
+    for (_, triangles) in scenes(&mut random) {
         for ray in rays(&triangles, 60, &mut random) {
             let ray = DRay::half_line(ray.origin(), ray.direction()).unwrap();
-            for _ in 0..12 {
-                let triangle = random.of(&triangles);
-                let found = triangle.intersect(&ray);
-                let real = distance([ray.origin(), ray.direction()], triangle.0);
-                let is_right = match &real {
-                    Some(real) => found.is_some_and(|t| {
-                        let is_even = t.to_bits() & 1 == 0;
-                        is_rounded_to(real, [t.next_down(), t, t.next_up()], is_even)
-                    }),
-                    None => found.is_none(),
-                };
-                assert!(is_right, "{name}: {found:?} {real:?} {ray:?} {triangle:?}");
-                hits += usize::from(found.is_some());
-            }
+            let triangles: [DTriangle; 12] = std::array::from_fn(|_| random.of(&triangles));
+            hits += triangles.iter().filter(|triangle| check_pair(&ray, triangle)).count();
         }
     }
     assert!(hits > 500, "{hits}");
@@ -143,79 +147,103 @@ fn trees(triangles: &[DTriangle], random: &mut Random) -> Vec<Bvh> {
     trees
 }
 
+/// The side from which hits count, and whether the nearest hit of each ray is excluded.
+const SELECTIONS: [(Orientation, bool); 4] = [
+    (Orientation::Any, false),
+    (Orientation::Any, true),
+    (Orientation::Exiting, false),
+    (Orientation::Entering, true),
+];
+
+/// Compares every kernel's nearest and any hits, of single rays, batches and packets, with a test of
+/// every triangle. Returns the nearest hits.
+fn check_kernels(
+    triangles: &[DTriangle],
+    trees: &[Bvh],
+    (orientation, excludes): (Orientation, bool),
+    rays: &[DRay],
+) -> Vec<Option<DHit>> {
+    let nearest = |ray| brute_force(triangles, ray, Select::default());
+    let excluded: Vec<u32> = match excludes {
+        true => rays.iter().map(|ray| nearest(ray).map_or(0, |hit| hit.object)).collect(),
+        false => vec![],
+    };
+    let all = Select { orientation, exclude: &excluded };
+    let of = |i: usize| Select { orientation, exclude: excluded.get(i..=i).unwrap_or_default() };
+    let expected: Vec<Option<DHit>> =
+        rays.iter().enumerate().map(|(i, ray)| brute_force(triangles, ray, of(i))).collect();
+    // Packets take sixteen rays that cohere.
+    let coherent: Vec<DRay> = rays.iter().flat_map(|&ray| [ray; 16]).collect();
+    let exclude: Vec<u32> = excluded.iter().flat_map(|&id| [id; 16]).collect();
+    let all_coherent = Select { orientation, exclude: &exclude };
+    for tree in trees {
+        let layout = DWideBvh::new(tree, triangles).unwrap();
+        for kernel in Kernel::ALL {
+            let Some(layout) = layout.clone().with_kernel(kernel) else { continue };
+            let mut nearest = vec![None; rays.len()];
+            let mut any = vec![false; rays.len()];
+            layout.nearest_hits(rays, all, &mut nearest, Coherence::Incoherent);
+            layout.any_hits(rays, all, &mut any, Coherence::Incoherent);
+            let mut nearest_of_packets = vec![None; coherent.len()];
+            let mut any_of_packets = vec![false; coherent.len()];
+            let (nearest_to, any_to) = (&mut nearest_of_packets, &mut any_of_packets);
+            layout.nearest_hits(&coherent, all_coherent, nearest_to, Coherence::Coherent);
+            layout.any_hits(&coherent, all_coherent, any_to, Coherence::Coherent);
+            for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
+                let case = || format!("{kernel:?}, {orientation:?}, {ray:?}");
+                let is_hit = expected.is_some();
+                assert_eq!(layout.nearest_hit(ray, of(i)), expected, "{}", case());
+                assert_eq!(layout.any_hit(ray, of(i)), is_hit, "{}", case());
+                assert_eq!((nearest[i], any[i]), (expected, is_hit), "{}", case());
+                let packet = 16 * i..16 * (i + 1);
+                assert_eq!(nearest_of_packets[packet.clone()], [expected; 16], "{}", case());
+                assert_eq!(any_of_packets[packet], [is_hit; 16], "{}", case());
+            }
+        }
+    }
+    expected
+}
+
 #[test]
 fn every_kernel_answers_as_a_test_of_every_triangle() {
     let mut random = Random(32);
     let mut hits = 0;
-    for (name, triangles) in scenes(&mut random) {
+    for (_, triangles) in scenes(&mut random) {
         let rays = rays(&triangles, 40, &mut random);
-        let excluded: Vec<u32> = rays
-            .iter()
-            .map(|ray| {
-                let nearest = brute_force(&triangles, ray, Select::default());
-                nearest.map_or(0, |hit| hit.object)
-            })
-            .collect();
         let trees = trees(&triangles, &mut random);
-        for (orientation, excludes) in [
-            (Orientation::Any, false),
-            (Orientation::Any, true),
-            (Orientation::Exiting, false),
-            (Orientation::Entering, true),
-        ] {
-            let exclude = if excludes { &excluded[..] } else { &[] };
-            let all = Select { orientation, exclude };
-            let of = |i: usize| {
-                let exclude = if excludes { &excluded[i..=i] } else { &[] };
-                Select { orientation, exclude }
-            };
-            let expected: Vec<Option<DHit>> = rays
-                .iter()
-                .enumerate()
-                .map(|(i, ray)| brute_force(&triangles, ray, of(i)))
-                .collect();
-            hits += expected.iter().flatten().count();
-            // Packets take sixteen rays that cohere.
-            let coherent: Vec<DRay> = rays.iter().flat_map(|&ray| [ray; 16]).collect();
-            let exclude: Vec<u32> = exclude.iter().flat_map(|&id| [id; 16]).collect();
-            let all_coherent = Select { orientation, exclude: &exclude };
-            for tree in &trees {
-                let layout = DWideBvh::new(tree, &triangles).unwrap();
-                for kernel in Kernel::ALL {
-                    let Some(layout) = layout.clone().with_kernel(kernel) else { continue };
-                    let mut nearest = vec![None; rays.len()];
-                    let mut any = vec![false; rays.len()];
-                    layout.nearest_hits(&rays, all, &mut nearest, Coherence::Incoherent);
-                    layout.any_hits(&rays, all, &mut any, Coherence::Incoherent);
-                    let mut nearest_of_packets = vec![None; coherent.len()];
-                    let mut any_of_packets = vec![false; coherent.len()];
-                    let (nearest_to, any_to) = (&mut nearest_of_packets, &mut any_of_packets);
-                    layout.nearest_hits(&coherent, all_coherent, nearest_to, Coherence::Coherent);
-                    layout.any_hits(&coherent, all_coherent, any_to, Coherence::Coherent);
-                    for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
-                        let case = || format!("{name}, {kernel:?}, {orientation:?}, {ray:?}");
-                        assert_eq!(layout.nearest_hit(ray, of(i)), expected, "{}", case());
-                        assert_eq!(layout.any_hit(ray, of(i)), expected.is_some(), "{}", case());
-                        assert_eq!(
-                            (nearest[i], any[i]),
-                            (expected, expected.is_some()),
-                            "{}",
-                            case()
-                        );
-                        let packet = 16 * i..16 * (i + 1);
-                        assert_eq!(
-                            nearest_of_packets[packet.clone()],
-                            [expected; 16],
-                            "{}",
-                            case()
-                        );
-                        assert_eq!(any_of_packets[packet], [expected.is_some(); 16], "{}", case());
-                    }
-                }
-            }
+        for selection in SELECTIONS {
+            hits += check_kernels(&triangles, &trees, selection, &rays).iter().flatten().count();
         }
     }
     assert!(hits > 700, "{hits}");
+}
+
+/// `RAYS` sets how many rays go through every scene.
+#[test]
+#[ignore = "nightly: minutes, a million rays through every scene"]
+fn a_million_rays_of_every_scene_answer_as_real_arithmetic() {
+    let count = std::env::var("RAYS").map_or(1_000_000, |rays| rays.parse().expect("a number"));
+    let mut random = Random(34);
+    for (name, triangles) in &scenes(&mut random) {
+        let trees = trees(triangles, &mut random);
+        let parts = trees.iter().flat_map(|tree| SELECTIONS.map(|selection| (tree, selection)));
+        let mut hits = 0;
+        for (tree, selection) in parts {
+            let rays = rays(triangles, count / (SELECTIONS.len() * trees.len()), &mut random);
+            let nearest = check_kernels(triangles, slice::from_ref(tree), selection, &rays);
+            for (ray, nearest) in rays.iter().zip(nearest) {
+                let other = random.of(triangles);
+                let half_line = DRay::half_line(ray.origin(), ray.direction()).unwrap();
+                check_pair(&half_line, &other);
+                if let Some(hit) = nearest {
+                    check_pair(&half_line, &triangles[hit.object as usize]);
+                    hits += 1;
+                }
+            }
+        }
+        println!("{name}: {hits} hits");
+        assert!(hits > count / 20, "{name}: {hits} hits");
+    }
 }
 
 #[test]

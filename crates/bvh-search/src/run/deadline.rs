@@ -27,6 +27,11 @@ impl Deadline {
         Self { start: Instant::now(), limit }
     }
 
+    /// Returns a limit that is over earlier by so much.
+    pub fn sooner(self, by: Duration) -> Self {
+        Self { limit: self.limit.saturating_sub(by), ..self }
+    }
+
     /// The time since the limit began.
     pub fn elapsed(&self) -> Duration {
         self.start.elapsed()
