@@ -25,11 +25,12 @@
 //! R, and so k is at most S over that half.
 
 use super::answer::{ANY_HIT, Bounded, NEAREST_HIT};
-use super::double_block::{decide, rounded_distance, splat};
+use super::double_block::{decide, rounded_distance};
 use super::instructions::{Instructions, Task};
-use super::lanes::{DoubleLanes, Lanes};
+use super::lanes::Lanes;
 use super::layout::{WideBvh, WideNode};
 use super::one_ray::{DeferredRay, Leaves, traverse};
+use super::ray_lanes::Turn;
 use super::triangles::TriangleBlock;
 use super::{build, portable, vector};
 use crate::double::{NearestHit, Query};
@@ -39,7 +40,7 @@ use crate::{
     Select, Slabs, Triangle, validate_references,
 };
 use bytemuck::Zeroable;
-use glam::{DMat3, DVec3, Vec4};
+use glam::{DMat3, DVec3};
 use std::borrow::Cow;
 
 /// An immutable copy of a tree and its triangles in f64, for tracing only.
@@ -67,8 +68,7 @@ pub struct DWideBvh {
     /// The triangles in f32, in the frame.
     pub(super) wide: WideBvh,
     pub(super) frame: Frame,
-    /// The axes of the file in the frame.
-    columns: [[f64; 4]; 3],
+    turn: Turn,
     /// By id.
     pub(super) triangles: Box<[DTriangle]>,
 }
@@ -98,9 +98,7 @@ impl DWideBvh {
             wide.bounds = framed.bounds;
             wide.near = framed.near;
         }
-        let [x, y, z] = frame.axes;
-        let columns = [0, 1, 2].map(|axis| [x[axis], y[axis], z[axis], 0.0]);
-        Ok(Self { wide, frame, columns, triangles: triangles.into() })
+        Ok(Self { wide, frame, turn: Turn::new(&frame), triangles: triangles.into() })
     }
 
     /// Returns the boxes of triangles in a frame, to build a tree over.
@@ -215,42 +213,15 @@ impl DWideBvh {
         self.frame.ray_of(ray.scaled_ends(), [ray.single(ray.t_min), ray.single(ray.t_max)])
     }
 
-    /// Returns the same, but for operations that are fused: an axis of the frame per lane.
+    /// Returns the same by vector registers.
     ///
     /// # Safety
-    /// The processor has the instructions of `L`, which has four lanes.
+    /// As [`Turn::ray`].
     #[inline(always)]
     unsafe fn boxed_by<L: Lanes>(&self, ray: &DRay) -> Ray {
-        const { assert!(L::N == 4) };
-        let [size, unit] = ray.scales();
-        let mut vectors = [Vec4::ZERO; 3];
-        // SAFETY: the processor has the instructions; a vector has four numbers.
-        unsafe {
-            let [origin, direction, inverse] =
-                vectors.each_mut().map(|vector| (&raw mut *vector).cast());
-            L::single(self.turned::<L>(ray.origin - self.frame.centre)).store(origin);
-            // The unit is found meanwhile.
-            let along = self.turned::<L>(ray.direction);
-            L::single(along * along.filled(unit)).store(direction);
-            L::single(along.filled(Frame::ABOVE * size) / along).store(inverse);
-        }
-        let [origin, direction, inverse] = vectors.map(Vec4::truncate);
-        let [t_min, t_max] = [ray.single(ray.t_min), ray.single(ray.t_max)];
-        Ray::with_inverse(origin, direction, inverse, t_min, t_max)
-    }
-
-    /// Returns the components of a direction in the frame, a lane each.
-    #[inline(always)]
-    unsafe fn turned<L: Lanes>(&self, direction: DVec3) -> L::Double {
-        // SAFETY: the processor has the instructions; a column has four numbers.
-        unsafe {
-            let [x, y, z] = splat::<L>(direction);
-            let [first, second, third] = &self.columns;
-            let first = L::Double::load(first.as_ptr());
-            let second = L::Double::load(second.as_ptr());
-            let third = L::Double::load(third.as_ptr());
-            z.mul_add(third, y.mul_add(second, x * first))
-        }
+        let range = [ray.single(ray.t_min), ray.single(ray.t_max)];
+        // SAFETY: the caller's.
+        unsafe { self.turn.ray::<L>(ray.origin, ray.direction, ray.scales(), range) }
     }
 
     /// Finds the nearest hit that counts, or with `ANY` any. Returns whether there is one.

@@ -1,6 +1,8 @@
 //! The nodes of a wide layout, the references from node to node and to leaves, and the arrays.
 
 use super::kernel::Kernel;
+use super::lanes::Lanes;
+use super::ray_lanes::Turn;
 use super::triangles::TriangleBlock;
 use crate::slabs::{FarRay, near_region};
 use crate::{Aabb, Frame, Ray, Slabs};
@@ -130,6 +132,7 @@ pub struct WideBvh {
 #[derive(Clone, Debug)]
 pub(crate) struct Framed {
     pub(crate) frame: Frame,
+    turn: Turn,
     /// The root's box, padded.
     pub(crate) bounds: Aabb,
     pub(crate) near: Aabb,
@@ -145,7 +148,8 @@ impl WideBvh {
         self.framed = frame.map(|frame| {
             let slack = Frame::slack(bounds);
             let padded = Frame::padded(bounds, slack);
-            Box::new(Framed { frame, bounds: padded, near: near_region(bounds), slack })
+            let (turn, near) = (Turn::new(&frame), near_region(bounds));
+            Box::new(Framed { frame, turn, bounds: padded, near, slack })
         });
     }
 
@@ -167,12 +171,18 @@ impl WideBvh {
     }
 
     /// Returns the ray as vector kernels test boxes with it, and whether it begins near the scene.
+    ///
+    /// # Safety
+    /// As [`Turn::ray`].
     #[inline(always)]
-    pub(crate) fn boxed(&self, ray: &Ray) -> (Ray, bool) {
+    pub(crate) unsafe fn boxed<L: Lanes>(&self, ray: &Ray) -> (Ray, bool) {
         match &self.framed {
             None => (*ray, ray.begins_in(&self.near)),
             Some(framed) => {
-                let ray = framed.frame.ray(ray);
+                let [origin, direction] = ray.ends().map(Vec3::as_dvec3);
+                let range = [ray.t_min(), ray.t_max()];
+                // SAFETY: the caller's.
+                let ray = unsafe { framed.turn.ray::<L>(origin, direction, [1.0; 2], range) };
                 (ray, ray.begins_in(&framed.near))
             }
         }

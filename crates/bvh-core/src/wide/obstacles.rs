@@ -86,7 +86,7 @@ impl Obstacles for WideBvh {
     }
 
     fn boxed(&self, ray: &Ray) -> Ray {
-        WideBvh::boxed(self, ray).0
+        self.frame().map_or(*ray, |frame| frame.ray(ray))
     }
 
     #[inline(always)]

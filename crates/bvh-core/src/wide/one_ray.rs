@@ -112,7 +112,7 @@ impl<K: Instructions, L: Leaves<K>, const ANY: bool> Task<K> for Rare<'_, L, ANY
         let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
         // SAFETY: the stack has room for `stack_need` children; the rest is as in `traverse`.
         unsafe {
-            let (boxed, is_near) = wide.boxed(ray);
+            let (boxed, is_near) = wide.boxed::<K::Block>(ray);
             if is_near {
                 visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(&boxed), leaves, base)
             } else {

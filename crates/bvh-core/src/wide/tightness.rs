@@ -78,7 +78,8 @@ impl<K: Instructions> Task<K> for Entered<'_> {
     unsafe fn run(self) -> u32 {
         let Self { wide, ray, node, test } = self;
         let t_max = ray.t_max();
-        let (boxed, is_near) = wide.boxed(ray);
+        // SAFETY: the processor has the instructions.
+        let (boxed, is_near) = unsafe { wide.boxed::<K::Block>(ray) };
         let equal = [*ray; 16];
         const { assert!(K::Rays::N <= 16) };
         // SAFETY: the processor has the instructions, and there are as many rays as lanes.
