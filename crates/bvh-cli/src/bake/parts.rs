@@ -1,12 +1,13 @@
 //! `bvh bake --parts`: cuts a scene by space into parts, bakes each as a job of its own, and joins
 //! the trees of the parts under a greedy top.
 
-use super::plan::{Found, Plan, Start, most_bytes};
+use super::BakeArgs;
+use super::found::Found;
+use super::plan::{Plan, Start, most_bytes};
 use super::watch::Watch;
-use super::{BakeArgs, save};
 use crate::Error;
 use crate::answer::{Answer, gain, short, whole};
-use crate::arguments::{load_scene, output_file};
+use crate::arguments::load_scene;
 use crate::interrupt::is_interrupted;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
@@ -43,7 +44,6 @@ impl Part {
 /// Lists the parts, bakes one part, or bakes the missing parts and joins all.
 pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Error> {
     let out = args.out()?;
-    output_file("--out", &out, "bvh")?;
     let plan = args.plan()?;
     if args.precision()? == Precision::Double {
         let accepted = "--precision single";
@@ -95,7 +95,7 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
     let plan = plan.share(1.0 - SHARE_OF_PARTS);
     let found =
         plan.search(&scene, Some(&start), &Open::default(), Watch::new(plan.effort), answer)?;
-    save(&found, &out, reserved, answer)
+    found.save(&out, reserved, answer)
 }
 
 /// Cuts a scene, and gives every part a share of the budget in proportion to its objects.
@@ -203,7 +203,7 @@ fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
 }
 
 fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Error> {
-    found.save(path, Reserved::new(path, 0, false)?)?;
+    found.write(path, Reserved::new(path, 0, false)?)?;
     let cost = found.baked.outcome.cost;
     let Some(base) = found.baked.greedy_cost else { return Ok(()) };
     let objects = found.scene.boxes.len();

@@ -1,25 +1,24 @@
 //! A search without its command line, its result, and the tree file.
 
 use super::effort::Effort;
+use super::found::{Found, Greedy, is_turned};
 use super::watch::Watch;
+use super::{BEST, BakeArgs};
 use crate::Error;
 use crate::answer::Answer;
-use crate::arguments;
+use crate::arguments::{self, input_file, load_scene, output_file, output_or_free, precision_of};
 use crate::interrupt::{INTERRUPTED, hold, is_interrupted};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_core::file::Header;
 use bvh_core::{Bvh, Frame, Node, Triangle};
-use bvh_scenes::Scene;
-use bvh_scenes::files::Reserved;
-use bvh_scenes::tree_file::{self, TreeFileError};
+use bvh_scenes::tree_file;
+use bvh_scenes::{Precision, Scene};
 use bvh_search::{
-    self, Bake, BakeError, Baked, Budget, Chosen, Division, MadeRays, Method, Observer, Open,
-    Reason,
+    Bake, BakeError, Budget, Choice, Frames, MadeRays, Method, Observer, Open, Reason,
 };
-use glam::DMat3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -210,7 +209,17 @@ impl Plan {
         // The work of all bakes that led to this tree, one after the other.
         let work = start.map_or(0, |start| start.work).saturating_add(baked.outcome.work);
         let greedy = Greedy { area, tests };
-        Ok(Found { plan: self, scene, chosen, is_tried, baked, greedy, work, seconds })
+        Ok(Found {
+            bake: self.bake(scene),
+            effort: self.effort,
+            scene,
+            chosen,
+            is_tried,
+            baked,
+            greedy,
+            work,
+            seconds,
+        })
     }
 }
 
@@ -227,69 +236,162 @@ impl Rival<'_> {
     }
 }
 
-/// Returns whether the boxes lie along other axes than the file's.
-pub fn is_turned(scene: &Scene) -> bool {
-    scene.frame.is_some_and(|frame| frame.rotation() != DMat3::IDENTITY)
-}
-
-/// What the greedy tree along the file's axes costs, if there was one.
-pub struct Greedy {
-    /// The total area of inner nodes, which the documentation compares.
-    pub area: Option<f64>,
-    /// The tests per ray in the wide layout.
-    pub tests: Option<f64>,
-}
-
-/// The result of a search, with what its file and its summary need.
-pub struct Found<'a> {
-    pub plan: &'a Plan,
-    pub scene: &'a Scene,
-    pub chosen: Chosen,
-    /// Whether the tree is a trial that the user interrupted.
-    is_tried: bool,
-    pub baked: Baked,
-    pub greedy: Greedy,
-    work: u64,
-    /// The time since the command began.
-    pub seconds: f64,
-}
-
-impl Found<'_> {
-    /// The search with all its choices.
-    pub fn settled(&self) -> Bake<'_> {
-        self.chosen.bake(&self.plan.bake(self.scene))
-    }
-
-    /// Writes the file of the tree. Returns its number of bytes.
-    pub fn save(&self, path: &Path, reserved: Reserved) -> Result<usize, Error> {
-        let written = self.settled().write(&self.baked.outcome.tree, self.work, |sections| {
-            reserved.write(sections)?;
-            Ok(sections.iter().map(|section| section.len()).sum())
-        });
-        written.map_err(TreeFileError::of(path))?
-    }
-
-    /// Returns whether the file at the path has a tree over the scene that is no worse than the one
-    /// of this interrupted search.
-    pub fn is_behind(&self, path: &Path) -> bool {
-        let Ok((old, _)) = tree_file::load(path, self.scene) else { return false };
-        let Baked { outcome, greedy_cost, division, .. } = &self.baked;
-        let [old, new] = [&old, &outcome.tree].map(|tree| match self.is_tried {
-            true => self.chosen.tests_per_ray(tree),
-            false => self.settled().cost(tree, *division),
-        });
-        // The old tree may be for another cost, by which a greedy tree would be behind.
-        old <= new || *greedy_cost == Some(outcome.cost)
-    }
-
-    /// Names the cost that the search minimised, unless it is the total area of inner nodes.
-    pub fn unit(&self) -> Option<&'static str> {
-        match (self.chosen.objective, self.chosen.density.is_some()) {
-            (Objective::Layout, true) => Some("cost of the wide layout for rays"),
-            (Objective::Layout, false) => Some("cost of the wide layout"),
-            (_, true) => Some("visits of rays"),
-            (_, false) if self.baked.division == Division::Allowed => Some("area of all nodes"),
-            (_, false) => None,
+impl BakeArgs {
+    /// Returns the file to write. Wrong paths are reported before the scene is loaded, which may take
+    /// long.
+    pub fn out(&self) -> Result<PathBuf, Error> {
+        if let Some(from) = &self.from {
+            input_file("--from", from)?;
         }
+        let out = output_or_free(self.out.as_ref(), || {
+            let scene = Path::new(&self.scene);
+            let stem = scene.file_stem().unwrap_or(scene.as_os_str());
+            // The colon of `escher:1000` is no part of a file's name everywhere.
+            let stem = stem.to_string_lossy().replace(':', "-");
+            PathBuf::from(stem + ".bvh")
+        })?;
+        output_file("--out", &out, "bvh")?;
+        Ok(out)
+    }
+
+    /// Returns the numbers of the scene's triangles. Rejects f64 for tracers of f32.
+    pub fn precision(&self) -> Result<Precision, Error> {
+        let precision = match (self.precision, &self.from) {
+            (None, Some(from)) => precision_of(from)?,
+            (given, _) => given.unwrap_or_default(),
+        };
+        match self.tracer {
+            Some(Target { name, .. }) if precision == Precision::Double => {
+                let accepted = "--precision single";
+                Err(Error::Usage(format!("--for {name} in double; accepted: {accepted}")))
+            }
+            _ => Ok(precision),
+        }
+    }
+
+    /// Loads the scene. Rejects rays that it cannot be traced with.
+    pub fn scene(&self, plan: &Plan) -> Result<Scene, Error> {
+        let scene = load_scene(&self.scene, self.precision()?)?;
+        plan.rays.as_ref().map_or(Ok(()), |rays| rays.check(&scene))?;
+        Ok(scene)
+    }
+
+    /// Returns what the arguments leave open. The tracers of others have a cost of their own.
+    pub fn open<'a>(&self, anywhere: MadeRays<'a>) -> Open<'a> {
+        let is_ours = self.tracer.is_none();
+        Open {
+            budget: self.budget.is_none(),
+            cost: is_ours && self.cost.is_none(),
+            references: is_ours && self.references.is_none(),
+            anywhere: is_ours.then_some(anywhere),
+            ..Open::default()
+        }
+    }
+
+    /// Loads the tree of `--from`, whose references the plan then permits, and whose cost and rays
+    /// it takes over.
+    pub fn start(
+        &self,
+        scene: &Scene,
+        plan: &mut Plan,
+        answer: &mut Answer,
+    ) -> Result<Option<Start>, Error> {
+        let Some(from) = &self.from else { return Ok(None) };
+        let (start, header) = Start::load(from, scene)?;
+        self.take_over(&header, plan, answer);
+        let [objects, references] = [scene.boxes.len(), start.tree.prim_ids.len()];
+        if references <= objects.max((plan.references * objects as f64) as usize) {
+            return Ok(Some(start));
+        }
+        if self.references.is_some() || self.tracer.is_some() {
+            // Rounded up, so that the message's number suffices.
+            let least = (100 * references).div_ceil(objects) as f64 / 100.0;
+            return Err(Error::Usage(format!(
+                "--from {}: the tree has {references} references to {objects} objects; accepted: \
+                 --references {least:.2} or more",
+                from.display()
+            )));
+        }
+        // No search makes all divided objects whole again.
+        plan.references = Bake::references_of(references, objects);
+        Ok(Some(start))
+    }
+
+    /// Continues what the bake of a tree minimised, where the arguments say nothing else.
+    fn take_over(&self, header: &Header, plan: &mut Plan, answer: &mut Answer) {
+        let own = header.objective;
+        let is_open = self.tracer.is_none() && self.rays.is_none();
+        // Trees of other programs may be for other costs.
+        let is_ours = [Objective::InternalArea, Objective::Layout].contains(&own);
+        if !(is_open && is_ours && self.cost.is_none_or(|cost| cost == own)) {
+            return;
+        }
+        plan.objective = Some(own);
+        if own == Objective::Layout && self.cost.is_none() {
+            answer.line("choices", "cost: the wide layout's, as of the tree of --from".into());
+        }
+        if header.has_visits {
+            plan.rays = Some(Rays::Default);
+            let why = "rays: default, because the tree of --from is for rays; for others, --rays";
+            answer.line("choices", why.into());
+        }
+    }
+
+    /// Returns the scene in the frame of its bake, and says why it is the best one.
+    pub fn turned(
+        &self,
+        plan: &Plan,
+        scene: Scene,
+        start: Option<&Start>,
+        watch: &Watch,
+        answer: &mut Answer,
+    ) -> Scene {
+        if let Some(Start { tree, .. }) = start {
+            return scene.in_frame(tree.frame);
+        }
+        let is_free = matches!(plan.method, Method::Best(_)) && self.tracer.is_none();
+        let frames = if is_free { self.frame.unwrap_or_default() } else { Frames::File };
+        let budget = plan.budget(scene.boxes.len());
+        let Some(choice) = Choice::of_shapes(&scene.primitives, frames, budget, watch) else {
+            return scene;
+        };
+        if frames == Frames::Auto && !is_interrupted() {
+            watch.bar.suspend(|| answer.say(&Reason::Frame(choice).to_string()));
+        }
+        if self.explain && choice.agreeing > 0.0 {
+            let percent = 100.0 * choice.agreeing;
+            let line = format!("frame: {percent:.0} % of the triangles, by size, share their axes");
+            answer.line("explanation", line);
+        }
+        scene.in_frame(choice.frame)
+    }
+
+    /// Returns the search that the arguments specify. Rejects methods that would ignore other
+    /// arguments.
+    pub fn plan(&self) -> Result<Plan, Error> {
+        let rays = self.rays.as_deref().map(Rays::read).transpose()?;
+        let is_best = matches!(self.method, Method::Best(_));
+        let default = self.tracer.filter(|_| is_best).map_or(1.0, |tracer| tracer.references);
+        let references = self.references.unwrap_or(default);
+        Bake::check_references(references).map_err(|error| Error::Usage(format!("--{error}")))?;
+        let name = self.method.name();
+        let ignored = match (&self.from, references > 1.0) {
+            _ if is_best => None,
+            (Some(_), _) => Some(format!("--method {name} cannot continue --from a tree")),
+            (None, true) => Some(format!("--references {references} with --method {name}")),
+            (None, false) => None,
+        };
+        if let Some(ignored) = ignored {
+            return Err(Error::Usage(format!("{ignored}; accepted: {BEST}")));
+        }
+        Ok(Plan {
+            method: self.method.clone(),
+            effort: self.budget,
+            seed: self.seed,
+            objective: self.cost,
+            references,
+            rays,
+            tracer: self.tracer,
+        })
     }
 }

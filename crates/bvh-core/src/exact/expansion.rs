@@ -10,7 +10,7 @@
 //! predicates', theorems 6 (Knuth's sum), 10 (grow-expansion), 18 (Dekker's product); zero terms
 //! are eliminated as in section 2.3.
 
-use super::quotient::Twice;
+use super::twice::{Twice, two_product};
 
 /// An exact number: the sum of at most `N` terms.
 #[derive(Clone, Copy, Debug)]
@@ -124,24 +124,4 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let b_part = sum - a;
     let a_part = sum - b_part;
     (sum, (a - a_part) + (b - b_part))
-}
-
-/// Returns the rounded product of two numbers and the rounding error (Dekker). It avoids the fused
-/// operation, which `core` and some processors lack.
-pub(super) fn two_product(a: f64, b: f64) -> (f64, f64) {
-    let product = a * b;
-    let (a_high, a_low) = split(a);
-    let (b_high, b_low) = split(b);
-    let rest = a_high * b_high - product;
-    let rest = rest + a_high * b_low;
-    let rest = rest + a_low * b_high;
-    (product, rest + a_low * b_low)
-}
-
-/// Splits a number into two halves of at most 26 bits each.
-fn split(a: f64) -> (f64, f64) {
-    const SPLITTER: f64 = ((1_u64 << 27) + 1) as f64;
-    let scaled = SPLITTER * a;
-    let high = scaled - (scaled - a);
-    (high, a - high)
 }

@@ -82,12 +82,12 @@
 
 mod expansion;
 mod number;
-mod quotient;
+mod twice;
 mod volumes;
 
 use glam::DVec3;
 pub(crate) use number::{Number, Point};
-pub(crate) use quotient::{Numbers, Twice, distance};
+pub(crate) use twice::{Numbers, Twice, distance};
 use volumes::{Volumes, difference};
 
 /// The axes of the shear, indexed by the axis of the direction's largest component.

@@ -2,7 +2,7 @@
 //! otherwise as expansions.
 
 use super::expansion::Expansion;
-use super::quotient::{self, Twice};
+use super::twice::{self, Twice};
 use super::{Line, Number, Point};
 
 /// An exact difference of two points.
@@ -63,7 +63,7 @@ impl Volumes {
 
     /// Returns the sign of d · (p × q).
     fn volume(&self, p: Difference, q: Difference) -> i32 {
-        match quotient::sign(self.direction.map(Twice::of), p, q) {
+        match twice::sign(self.direction.map(Twice::of), p, q) {
             0 => self.along(&exact(p), &exact(q)).sign(),
             sign => sign,
         }
@@ -103,7 +103,7 @@ impl Volumes {
     pub(super) fn rounded_distance<N: Number>(&self) -> Option<N> {
         let [a, b, c] = self.triangle;
         let [p, q] = [difference(b, a), difference(c, a)];
-        let [low, high] = quotient::distance(self.corners[0], self.direction, p, q, None);
+        let [low, high] = twice::distance(self.corners[0], self.direction, p, q, None);
         // Of a distance of 0 the sign decides, and none rounds to infinity.
         if low == high
             && 0.0 < low
@@ -112,7 +112,7 @@ impl Volumes {
         {
             return Some(distance);
         }
-        if quotient::sign(self.corners[0], p, q) * self.volume(p, q) < 0 {
+        if twice::sign(self.corners[0], p, q) * self.volume(p, q) < 0 {
             return None;
         }
         let [corner, p, q] = [self.corners[0], p, q].map(exact);

@@ -2,8 +2,8 @@
 
 use super::kernel::Kernel;
 use super::lanes::Lanes;
-use super::ray_lanes::Turn;
 use super::triangles::TriangleBlock;
+use super::turn::Turn;
 use crate::slabs::{FarRay, near_region};
 use crate::{Aabb, Frame, Ray, Slabs};
 use bytemuck::{Pod, Zeroable};

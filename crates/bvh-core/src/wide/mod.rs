@@ -37,6 +37,7 @@ mod ray_lanes;
 mod refit;
 mod tightness;
 mod triangles;
+mod turn;
 // The kernels of the target, or none.
 #[cfg_attr(target_arch = "x86_64", path = "x86/mod.rs")]
 #[cfg_attr(

@@ -32,7 +32,6 @@
 //! The [signs](sign) of d · n and A · n follow from the same sums with d or A for P, whose small parts
 //! are smaller: they are off by less than 118ε²M or 118ε²N, and nothing underflows.
 
-use super::expansion::two_product;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// A number, or several side by side.
@@ -193,4 +192,24 @@ pub(crate) fn distance<D: Numbers>(
     let slack = t.abs().mul_add(tilt, height) * t.filled(1.0 / (1_u128 << 97) as f64);
     let slack = (change.abs() * tilt).mul_add(t.filled(1.0 / (1_u64 << 48) as f64), slack);
     [t + (change - slack), t + (change + slack)]
+}
+
+/// Returns the rounded product of two numbers and the rounding error (Dekker). It avoids the fused
+/// operation, which `core` and some processors lack.
+pub(super) fn two_product(a: f64, b: f64) -> (f64, f64) {
+    let product = a * b;
+    let (a_high, a_low) = split(a);
+    let (b_high, b_low) = split(b);
+    let rest = a_high * b_high - product;
+    let rest = rest + a_high * b_low;
+    let rest = rest + a_low * b_high;
+    (product, rest + a_low * b_low)
+}
+
+/// Splits a number into two halves of at most 26 bits each.
+fn split(a: f64) -> (f64, f64) {
+    const SPLITTER: f64 = ((1_u64 << 27) + 1) as f64;
+    let scaled = SPLITTER * a;
+    let high = scaled - (scaled - a);
+    (high, a - high)
 }
