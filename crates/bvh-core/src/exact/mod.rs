@@ -292,7 +292,7 @@ impl Line {
             }
         }
         let [low, high] = sides.iter().fold([0, 0], |[low, high], &s| [s.min(low), s.max(high)]);
-        // A line in the triangle's plane is on no side of any edge.
+        // The sum of the edge values is −d · n: where all are 0, the line is parallel to the plane.
         if low == high || low < 0 && high > 0 || is_moved && sides.contains(&0) {
             return None;
         }

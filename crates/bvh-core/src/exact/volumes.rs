@@ -104,7 +104,7 @@ impl Volumes {
         let [a, b, c] = self.triangle;
         let [p, q] = [difference(b, a), difference(c, a)];
         let [low, high] = twice::distance(self.corners[0], self.direction, p, q, None);
-        // Of a distance of 0 the sign decides, and none rounds to infinity.
+        // Of a distance of 0 the sign decides, and one this large may round to infinity in f32.
         if low == high
             && 0.0 < low
             && low < f64::from(f32::MAX)
