@@ -53,6 +53,21 @@ def test_answers_are_those_of_the_python_engine(mesh):
     np.testing.assert_array_equal(index_ray, np.nonzero(first >= 0)[0])
 
 
+def test_a_ray_that_touches_an_edge_or_a_corner_has_a_hit_in_every_query():
+    mesh = trimesh.creation.box()
+    # At the middle of an edge, at a corner, through a corner, past all, and through two faces.
+    origins = [[1.5, 0.1, -0.5], [1.5, 0.5, -0.5], [1.5, 1.5, 1.5], [1.5, 0.1, -0.4], [0.1, 0.2, 1.5]]
+    directions = [[-1, 0, 1], [-1, 0, 1], [-1, -1, -1], [-1, 0, 1], [0, 0, -1]]
+    ours = RayMeshIntersector(mesh)
+    hits = np.array([True, True, True, False, True])
+    np.testing.assert_array_equal(ours.intersects_any(origins, directions), hits)
+    locations, index_ray, index_tri = ours.intersects_location(origins, directions)
+    np.testing.assert_array_equal(index_ray, [0, 1, 2, 2, 4, 4])
+    np.testing.assert_allclose(locations[:2], [[0.5, 0.1, 0.5], [0.5, 0.5, 0.5]])
+    first = ours.intersects_first(origins, directions)
+    np.testing.assert_array_equal(index_tri[:2], first[:2])
+
+
 @pytest.mark.parametrize("away", [1e3, 1e5, 1e7, 1e9])
 def test_rays_from_far_away_hit_the_faces_of_exact_arithmetic(away):
     mesh = trimesh.creation.icosphere(subdivisions=1)

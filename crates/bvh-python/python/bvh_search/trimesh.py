@@ -118,7 +118,8 @@ class RayMeshIntersector:
         progress: Progress | None = None,
     ) -> Any:
         """Returns the indices of the faces that are hit and of their rays, and with
-        `return_locations` the locations. Hits are sorted by ray, then by distance.
+        `return_locations` the locations. Hits are sorted by ray, then by distance. Through an edge or a
+        corner a ray enters once and leaves once; one that only touches the mesh hits its first face.
 
         >>> mesh.ray.intersects_id([[0.1, 0.2, 5]], [[0, 0, -1]])[1]
         array([0, 0])
@@ -126,6 +127,16 @@ class RayMeshIntersector:
         rays = self._rays(ray_origins, ray_directions)
         if multiple_hits:
             t, index_tri, index_ray = self._tracer().all(*rays, invalid="miss", progress=progress)
+            misses = np.bincount(index_ray, minlength=len(rays[0])) == 0
+            others = [vectors[misses] for vectors in rays]
+            touches = self._tracer().any(*others, invalid="miss", progress=progress)
+            if touches.any():
+                touched = (vectors[touches] for vectors in others)
+                nearest = self._tracer().nearest(*touched, invalid="miss", progress=progress)
+                index_ray = np.concatenate([index_ray, np.nonzero(misses)[0][touches]])
+                order = np.argsort(index_ray, kind="stable")
+                t, index_tri = (np.concatenate(both)[order] for both in zip((t, index_tri), nearest))
+                index_ray = index_ray[order]
             # A ray has more hits if the hit so many places later is its own, too.
             if (index_ray[max_hits:] == index_ray[: max(len(index_ray) - max_hits, 0)]).any():
                 first = np.searchsorted(index_ray, index_ray)
