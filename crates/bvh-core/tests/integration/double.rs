@@ -10,6 +10,10 @@ use bvh_core::{
 use glam::{DMat3, DQuat, DVec3};
 use std::slice;
 
+/// Sizes and offsets of scenes.
+const PLACES: [(f64, f64); 6] =
+    [(1.0, 0.0), (1.0, 1e7), (1e-30, 0.0), (1e30, 0.0), (1e-3, 5e5), (3.0, 1e-5)];
+
 /// Returns scenes in f64 at many places and sizes, turned, with what f32 could not hold.
 fn scenes(random: &mut Random) -> Vec<(String, Vec<DTriangle>)> {
     let shapes = [
@@ -20,9 +24,7 @@ fn scenes(random: &mut Random) -> Vec<(String, Vec<DTriangle>)> {
     ];
     let mut scenes = Vec::new();
     for (name, triangles) in shapes {
-        for (size, offset) in
-            [(1.0, 0.0), (1.0, 1e7), (1e-30, 0.0), (1e30, 0.0), (1e-3, 5e5), (3.0, 1e-5)]
-        {
+        for (size, offset) in PLACES {
             let turn = DQuat::from_xyzw(0.1, 0.7, -0.3, 0.5).normalize();
             let turn = if random.below(2) == 0 { turn } else { DQuat::IDENTITY };
             let moved = |p: glam::Vec3| {
@@ -218,11 +220,12 @@ fn every_kernel_answers_as_a_test_of_every_triangle() {
     assert!(hits > 700, "{hits}");
 }
 
-/// `RAYS` sets how many rays go through every scene.
+/// `RAYS` sets how many rays go through every shape, at all its places together.
 #[test]
-#[ignore = "nightly: minutes, a million rays through every scene"]
-fn a_million_rays_of_every_scene_answer_as_real_arithmetic() {
+#[ignore = "nightly: minutes, a million rays through every shape"]
+fn a_million_rays_of_every_shape_answer_as_real_arithmetic() {
     let count = std::env::var("RAYS").map_or(1_000_000, |rays| rays.parse().expect("a number"));
+    let count = count / PLACES.len();
     let mut random = Random(34);
     for (name, triangles) in &scenes(&mut random) {
         let trees = trees(triangles, &mut random);
