@@ -215,16 +215,6 @@ pub enum Orientation {
     Entering,
 }
 
-impl Orientation {
-    fn admits(self, side: impl FnOnce() -> i32) -> bool {
-        match self {
-            Self::Any => true,
-            Self::Exiting => side() > 0,
-            Self::Entering => side() < 0,
-        }
-    }
-}
-
 /// Which hits of a ray count.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Select<'a> {
@@ -251,10 +241,14 @@ impl<'a> Select<'a> {
         }
     }
 
-    /// Returns whether a hit counts on a triangle that the ray crosses from a
-    /// [side](Line::crossed_side).
+    /// Returns whether a hit counts on a triangle to which the ray comes from a [side](Line::side).
     fn admits(&self, object: u32, side: impl FnOnce() -> i32) -> bool {
-        !self.exclude.contains(&object) && self.orientation.admits(side)
+        !self.exclude.contains(&object)
+            && match self.orientation {
+                Orientation::Any => true,
+                Orientation::Exiting => side() > 0,
+                Orientation::Entering => side() < 0,
+            }
     }
 
     /// Returns those of some hits that are of the orientation, by the bits of those along the normal.
@@ -399,9 +393,6 @@ impl Query<'_> {
 
     /// Takes a triangle, decided by itself. Returns whether it is the new nearest hit.
     pub(crate) fn offer(&self, nearest: &mut NearestHit, object: u32) -> bool {
-        if self.select.exclude.contains(&object) {
-            return false;
-        }
         let Some(bounds) = self.bounds(object) else { return false };
         self.take(nearest, NearestHit::between(bounds, object))
     }
@@ -473,7 +464,7 @@ impl Query<'_> {
     }
 
     /// Returns bounds of the distance at which the ray hits a triangle, without its range. Where they
-    /// take exact arithmetic, triangles of the other side have none.
+    /// take exact arithmetic, triangles that do not count have none.
     #[cold]
     #[inline(never)]
     pub(crate) fn bounds(&self, object: u32) -> Option<(f64, f64)> {
@@ -482,7 +473,7 @@ impl Query<'_> {
         match line.filter(corners) {
             Verdict::Miss => None,
             Verdict::Between(low, high) => Some((low, high)),
-            Verdict::Unsure if self.select.orientation.admits(|| line.side(corners)) => {
+            Verdict::Unsure if self.select.admits(object, || line.side(corners)) => {
                 let t = line.crossing(corners, false)?;
                 Some((t, t))
             }

@@ -125,10 +125,10 @@ fn search(bake: &Bake, mut watch: Watch) -> Result<Array, JsValue> {
     let greedy = bake.greedy(&watch).map_err(error)?;
     let mut comparison = f64::INFINITY;
     if let Some(tree) = &greedy {
-        comparison = 1000.0 * TARGET.comparison_seconds(tree);
+        let cost = TARGET.cost(&TARGET.fit(tree));
+        comparison = 1000.0 * Target::comparison_seconds(cost);
         // All trees of whole triangles have the same area of leaves.
         if bake.references == 1.0 {
-            let cost = TARGET.cost(&TARGET.fit(tree));
             let root = tree.root_aabb().map_or(0.0, |root| root.half_area());
             let added = TARGET.constants.traversal() / root;
             watch.estimate = [cost - added * internal_area(tree), added];

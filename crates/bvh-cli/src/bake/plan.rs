@@ -112,7 +112,8 @@ impl Plan {
         let tracer = self.tracer.filter(|_| matches!(self.method, Method::Best(_)))?;
         let triangles = scene.triangles().ok()?;
         if let Some(left) = watch.left() {
-            let time = Duration::from_secs_f64(tracer.comparison_seconds(greedy));
+            let cost = tracer.cost(&tracer.fit(greedy));
+            let time = Duration::from_secs_f64(Target::comparison_seconds(cost));
             if time > left / SHARE {
                 return None;
             }

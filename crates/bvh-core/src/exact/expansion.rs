@@ -45,7 +45,7 @@ impl<const N: usize> Expansion<N> {
         let mut carry = number;
         let mut kept = 0;
         for i in 0..self.len {
-            let (sum, rest) = two_sum(carry, self.terms[i]);
+            let Twice(sum, rest) = Twice::sum(carry, self.terms[i]);
             if rest != 0.0 {
                 self.terms[kept] = rest;
                 kept += 1;
@@ -116,12 +116,4 @@ impl Expansion<2> {
         }
         both
     }
-}
-
-/// Returns the rounded sum of two numbers and the rounding error (Knuth).
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
-    let sum = a + b;
-    let b_part = sum - a;
-    let a_part = sum - b_part;
-    (sum, (a - a_part) + (b - b_part))
 }

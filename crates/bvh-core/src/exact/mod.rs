@@ -222,12 +222,13 @@ impl Line {
     /// [`Triangle::crossing`](crate::Triangle::crossing): 1 along the normal, −1 against it, and 0 if it
     /// does not.
     pub(crate) fn crossed_side<P: Point>(&self, triangle: &[P; 3]) -> i32 {
+        let verdict = self.filter(triangle);
+        if verdict == Verdict::Miss {
+            return 0;
+        }
         let side = self.side(triangle);
-        let is_crossed = match self.filter(triangle) {
-            Verdict::Miss => false,
-            Verdict::Between(..) => true,
-            Verdict::Unsure => side != 0 && self.distance(triangle, true).is_some(),
-        };
+        let is_crossed =
+            verdict != Verdict::Unsure || side != 0 && self.distance(triangle, true).is_some();
         if is_crossed { side } else { 0 }
     }
 
@@ -291,9 +292,11 @@ impl Line {
                 *side = volumes.moved_side(edge);
             }
         }
-        let [low, high] = sides.iter().fold([0, 0], |[low, high], &s| [s.min(low), s.max(high)]);
         // The sum of the edge values is −d · n: where all are 0, the line is parallel to the plane.
-        if low == high || low < 0 && high > 0 || is_moved && sides.contains(&0) {
+        if sides == [0; 3]
+            || sides.contains(&-1) && sides.contains(&1)
+            || is_moved && sides.contains(&0)
+        {
             return None;
         }
         match rounded(verdict) {

@@ -31,9 +31,8 @@ macro_rules! number {
             }
 
             fn rounded_again(x: f64) -> Option<Self> {
-                let [below, above] = [x.next_down(), x.next_up()].map(|x| x as Self);
-                let is_f64 = size_of::<Self>() == size_of::<f64>();
-                (is_f64 || below == above).then_some(x as Self)
+                let [below, rounded, above] = [x.next_down(), x, x.next_up()].map(|x| x as Self);
+                (f64::from(rounded) == x || below == above).then_some(rounded)
             }
 
             #[inline(always)]

@@ -91,7 +91,7 @@ impl Twice<f64> {
 impl<D: Numbers> Twice<D> {
     /// The exact sum of two numbers (Knuth).
     #[inline(always)]
-    fn sum(a: D, b: D) -> Self {
+    pub(super) fn sum(a: D, b: D) -> Self {
         let sum = a + b;
         let b_part = sum - a;
         let a_part = sum - b_part;

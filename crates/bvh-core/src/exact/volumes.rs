@@ -104,11 +104,10 @@ impl Volumes {
         let [a, b, c] = self.triangle;
         let [p, q] = [difference(b, a), difference(c, a)];
         let [low, high] = twice::distance(self.corners[0], self.direction, p, q, None);
-        // Of a distance of 0 the sign decides, and one this large may round to infinity in f32.
+        // Of a distance of 0 the sign decides.
         if low == high
-            && 0.0 < low
-            && low < f64::from(f32::MAX)
-            && let Some(distance) = N::rounded_again(low)
+            && low > 0.0
+            && let Some(distance) = N::rounded_again(low).filter(|distance| distance.is_finite())
         {
             return Some(distance);
         }

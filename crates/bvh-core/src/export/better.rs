@@ -53,11 +53,10 @@ impl Target {
         if better.is_searched() { better } else { Better { tree: own, ..better } }
     }
 
-    /// Returns about how many seconds [`fit_better`](Self::fit_better) takes for trees like this one,
-    /// if every test waits for memory. O(nodes).
-    pub fn comparison_seconds(&self, tree: &Bvh) -> f64 {
-        let rays = f64::from(2 * RAYS);
-        let tests = 2.0 * rays * self.cost(&self.fit(tree));
+    /// Returns about how many seconds [`fit_better`](Self::fit_better) takes for trees of such a
+    /// [cost](Self::cost), if every test waits for memory.
+    pub fn comparison_seconds(cost: f64) -> f64 {
+        let tests = 2.0 * f64::from(2 * RAYS) * cost;
         tests.min(MOST_TESTS as f64) / TESTS_PER_SECOND
     }
 
