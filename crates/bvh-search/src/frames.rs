@@ -26,20 +26,20 @@ const SHARE: f64 = 0.1;
 /// The work of a greedy tree per object, by its time.
 const WORK_PER_OBJECT: f64 = 20.0;
 /// The work per object of the short searches that decide. Greedy trees differ by up to 4 % where
-/// searched ones do not.
-const CONFIRMING: u64 = 64;
+/// searched ones do not. Three times the work, over a third of the triangles, errs twice as much.
+const CONFIRMING: u64 = 20;
 /// The work per object of the last sample, over which two or three frames are searched.
-const LAST: f64 = 188.0;
+const LAST: f64 = 60.0;
 /// The least gain by a short search.
 const LEAST_GAIN: f64 = 0.01;
 /// The nodes that a move visits, about.
 const WORK_PER_MOVE: f64 = 64.0;
 /// The least and the most triangles of the first sample.
 const FIRST: [usize; 2] = [64, 4096];
-/// The least within little work. Its last sample of 128 triangles still tells a tenth of the area.
+/// The least within little work. Its last sample of 384 triangles still tells a tenth of the area.
 const LEAST: usize = 8;
-/// By what each later sample is larger than the one before.
-const GROWTH: usize = 4;
+/// By what the second sample and the last one are larger than the first.
+const GROWTH: [usize; 2] = [4, 48];
 /// The neighbours in the file that the last sample keeps together, as they are in most scenes: the
 /// details that a small rotation spoils are lost where all around them is left out. Fewer in small
 /// samples, which are to be from several parts, too.
@@ -53,15 +53,15 @@ const ASKED: usize = 8;
 const TOLD: usize = 12;
 const STARTS: usize = 17;
 /// Candidates that survive a step of the local search.
-const KEPT: usize = 4;
-/// The largest rotations of the steps, as tangents of half of the angles: 23° to 0.7°.
-const STEPS: [f64; 6] = [0.2, 0.1, 0.05, 0.025, 0.0125, 0.006];
+const KEPT: usize = 6;
+/// The largest rotations of the steps, as tangents of half of the angles: 33° to 0.7°.
+const STEPS: [f64; 6] = [0.3, 0.14, 0.064, 0.029, 0.013, 0.006];
 /// The share of one direction above which other candidates are not tried.
 const CLEAR: f64 = 0.5;
 /// The share above which a direction is no accident.
 const HEAVY: f64 = 0.005;
 /// What is added to the least gain for a sample of one triangle; for a sample of n, √n times less.
-const DOUBT: f64 = 1.0;
+const DOUBT: f64 = 0.25;
 
 /// Whether a bake of triangles chooses a [`Frame`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -194,9 +194,9 @@ struct Scene<'a> {
 impl Scene<'_> {
     fn work(&self, size: usize, searches: bool) -> f64 {
         let sample = |growth: usize| (growth * size).min(self.triangles.len());
-        let search = (STARTS + 3 * KEPT * STEPS.len()) * sample(1) + KEPT * sample(GROWTH);
+        let search = (STARTS + 3 * KEPT * STEPS.len()) * sample(1) + KEPT * sample(GROWTH[0]);
         let rest = self.asked(size) + if searches { search } else { 0 };
-        LAST * sample(GROWTH * GROWTH) as f64 + WORK_PER_OBJECT * rest as f64
+        LAST * sample(GROWTH[1]) as f64 + WORK_PER_OBJECT * rest as f64
     }
 
     /// Returns the size of the sample that tells directions, which costs little.
@@ -222,8 +222,8 @@ impl Scene<'_> {
         if frames.len() == 1 {
             return Some(Choice { agreeing, sufficed: true, ..Choice::FILE });
         }
-        let run = RUN.min(GROWTH * size);
-        let last = sample(self.triangles, size * GROWTH * GROWTH, run, 4);
+        let run = RUN.min(GROWTH[0] * size);
+        let last = sample(self.triangles, GROWTH[1] * size, run, 4);
         let is_whole = last.len() == self.triangles.len();
         let doubt = if is_whole { 0.0 } else { DOUBT / (last.len() as f64).sqrt() };
         let areas = parallel::map(frames.clone(), |frame| searched(&last, frame.as_ref()));
@@ -260,7 +260,7 @@ impl Scene<'_> {
             self.rank(&mut ranked, near, &first)?;
         }
         let best = ranked.drain(..).map(|(_, rotation)| rotation).collect();
-        self.rank(&mut ranked, best, &sample(self.triangles, GROWTH * size, 1, 3))?;
+        self.rank(&mut ranked, best, &sample(self.triangles, GROWTH[0] * size, 1, 3))?;
         ranked.first().map(|(_, rotation)| *rotation)
     }
 

@@ -87,7 +87,7 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
 fn a_bake_of_work_or_without_flags_writes_the_bytes_that_the_library_gives_other_languages() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let scene = Scene::load("escher:400").unwrap();
+    let scene = Scene::load("escher:120").unwrap();
     let segments: Vec<Segment> = (0..90u8)
         .map(|i| Segment { from: [0.0, 9.0, f32::from(i)], to: [1.0, 0.5, f32::from(i) / 9.0] })
         .collect();
@@ -96,14 +96,14 @@ fn a_bake_of_work_or_without_flags_writes_the_bytes_that_the_library_gives_other
     fs::write(at.join("rays.bin"), bytes).unwrap();
     // One budget is long enough for a tree of reinsertion aside; without any, both choose.
     for (flags, references, rays, max_work) in [
-        ("--budget=300kwork", None, &[][..], Some(300_000)),
-        ("--budget=300kwork --references=1.3", Some(1.3), &[], Some(300_000)),
-        ("--budget=300kwork --rays=rays.bin", None, &segments, Some(300_000)),
-        ("--budget=9Mwork --rays=rays.bin --references=1.3", Some(1.3), &segments, Some(9_000_000)),
+        ("--budget=90kwork", None, &[][..], Some(90_000)),
+        ("--budget=90kwork --references=1.3", Some(1.3), &[], Some(90_000)),
+        ("--budget=90kwork --rays=rays.bin", None, &segments, Some(90_000)),
+        ("--budget=3Mwork --rays=rays.bin --references=1.3", Some(1.3), &segments, Some(3_000_000)),
         ("", None, &[], None),
         ("--rays=rays.bin", None, &segments, None),
     ] {
-        bvh(at, &format!("bake escher:400 --out=x.bvh --seed=5 {flags}"));
+        bvh(at, &format!("bake escher:120 --out=x.bvh --seed=5 {flags}"));
         let objects = Objects::Shapes(scene.primitives.clone());
         let budget = Budget { max_work, ..Budget::UNLIMITED };
         let anywhere: Option<Anywhere> = Some(bvh_scenes::rays::anywhere);
@@ -149,7 +149,7 @@ fn a_bake_gives_the_greedy_tree_or_the_tree_it_starts_from_without_a_budget_and_
 fn a_later_bake_continues_for_the_cost_and_the_rays_of_its_tree_where_none_are_given() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let bake = |out: &str, more: &str| facts(at, &format!("bake escher:400 --out={out} {more}"));
+    let bake = |out: &str, more: &str| facts(at, &format!("bake escher:200 --out={out} {more}"));
     let number =
         |facts: &serde_json::Map<_, serde_json::Value>, name| facts[name].as_f64().unwrap();
     for (first, method, objective, choices) in [
@@ -158,8 +158,8 @@ fn a_later_bake_continues_for_the_cost_and_the_rays_of_its_tree_where_none_are_g
         ("--rays=default --cost=area", "best for rays", "internal area", 1),
         ("", "best", "internal area", 0),
     ] {
-        let first = bake("a.bvh", &format!("--budget=300kwork {first}"));
-        for budget in ["0s", "1work", "2Mwork", "1s"] {
+        let first = bake("a.bvh", &format!("--budget=150kwork {first}"));
+        for budget in ["0s", "1work", "500kwork", "200ms"] {
             let later = bake("b.bvh", &format!("--budget={budget} --from=a.bvh"));
             assert!(number(&later, "minimised_cost") <= number(&later, "minimised_cost_of_start"));
             if !budget.ends_with('s') {
@@ -234,7 +234,7 @@ fn a_bake_without_budget_tries_what_is_not_given_the_same_on_any_number_of_threa
     let at = folder.path();
     // Other methods than `best` offer no choices.
     for (bake, tried) in [
-        ("escher:400", &["cost: ", "rays: ", "references: "][..]),
+        ("escher:120", &["cost: ", "rays: ", "references: "][..]),
         ("escher:60 --cost=area --references=1", &["rays: "]),
         ("escher:60 --rays=default", &["references: "]),
         ("escher:60 --method=reinsertion", &[]),
@@ -246,7 +246,7 @@ fn a_bake_without_budget_tries_what_is_not_given_the_same_on_any_number_of_threa
         }
         assert!(said.contains("budget: "), "{bake}: {said}");
     }
-    let json = facts(at, "bake escher:400 --out=x.bvh");
+    let json = facts(at, "bake escher:120 --out=x.bvh");
     assert_eq!(json["choices"].as_array().unwrap().len(), 4);
 }
 
@@ -310,7 +310,7 @@ fn an_oblique_scene_is_baked_in_a_frame_that_every_command_and_later_bake_keeps(
     let turned = |triangle: &Triangle| triangle.0.map(|corner| (rotation * corner).as_dvec3());
     let mesh = obj(scene.triangles().unwrap().iter().map(turned));
     fs::write(at.join("turned.obj"), mesh).unwrap();
-    let bake = "bake turned.obj --budget=20Mwork";
+    let bake = "bake turned.obj --budget=8Mwork";
     assert!(bvh(at, &format!("{bake} --explain --out=a.bvh")).contains("frame: turned by "));
     let baked = facts(at, &format!("{bake} --out=a.bvh"));
     let frame = &baked["frame"];
@@ -322,9 +322,9 @@ fn an_oblique_scene_is_baked_in_a_frame_that_every_command_and_later_bake_keeps(
     }
     let reported = facts(at, "report a.bvh turned.obj --out=a.html");
     assert_eq!(reported["area"]["greedy"], baked["greedy_area"]);
-    let auto = facts(at, "bake turned.obj:400 --out=auto.bvh");
+    let auto = facts(at, "bake turned.obj:150 --out=auto.bvh");
     assert!(auto["frame"].is_object() && auto["method"] == facts(at, "inspect auto.bvh")["method"]);
-    let reported = facts(at, "report auto.bvh turned.obj:400 --out=a.html");
+    let reported = facts(at, "report auto.bvh turned.obj:150 --out=a.html");
     let [ours, plain] =
         ["baked", "greedy"].map(|tree| reported["tests_per_ray"][tree].as_f64().unwrap());
     let saved = auto["tests_saved"].as_f64().unwrap();

@@ -38,7 +38,7 @@ fn ctrl_c_keeps_the_best_tree_so_far_also_while_a_bake_decides() {
 fn ctrl_c_keeps_a_better_tree_in_the_file_and_the_best_one_of_a_decision() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    bvh(at, "bake konistil --budget=300Mwork --out=a.bvh");
+    bvh(at, "bake konistil --budget=100Mwork --out=a.bvh");
     let good = fs::read(at.join("a.bvh")).unwrap();
     for bake in ["konistil --budget=1h", "konistil --budget=1h --rays=default", "konistil"] {
         interrupted(at, bake, Duration::from_millis(100));
@@ -93,7 +93,7 @@ fn ctrl_c_says_what_was_gained_and_also_while_the_frame_is_chosen_keeps_no_worse
     assert!(message.contains("nothing better was found yet; `--from a.bvh"), "{message}");
     assert!(number(at, "verify a.bvh turned.obj", "saved") >= 0.0);
     fs::remove_file(at.join("a.bvh")).unwrap();
-    let (said, message) = bake(Duration::from_secs(10), "--frame=file --json");
+    let (said, message) = bake(Duration::from_secs(4), "--frame=file --json");
     let facts: Value = serde_json::from_str(&said).unwrap();
     let saved = facts["saved"].as_f64().unwrap();
     assert!(saved > 0.0 && message.contains(facts["interrupted"].as_str().unwrap()), "{said}");

@@ -70,13 +70,13 @@ fn every_traversal_answers_as_brute_force_at_every_scale() {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let (traced, planes) = Traced::all_and_planes(&triangles, &mut random);
             divisions += planes.len();
-            let mut rays = rays(&triangles, 100, &mut random);
-            rays.extend(bundles(&triangles, 8, &mut random));
-            rays.extend(rays_on_planes(&triangles, &planes, 40, &mut random));
+            let mut rays = rays(&triangles, 60, &mut random);
+            rays.extend(bundles(&triangles, 4, &mut random));
+            rays.extend(rays_on_planes(&triangles, &planes, 20, &mut random));
             hits += check(&format!("{name} * 2^{exponent}"), &triangles, &traced, &rays);
         }
     }
-    assert!(hits > 4000, "the rays should hit something: {hits}");
+    assert!(hits > 2000, "the rays should hit something: {hits}");
     assert!(divisions > 1000, "triangles should be divided: {divisions}");
 }
 
@@ -159,9 +159,9 @@ fn ranges_that_end_at_a_hit_or_next_to_it_are_answered_alike_from_near_and_from_
     for scale in [1.0, 1e-20, 1e11, 1e14, 1e-38] {
         let triangles = scaled(&[soup(80, &mut random), grid_box(2)].concat(), scale);
         let traced = Traced::all(&triangles, &mut random);
-        let mut whole = rays(&triangles, 200, &mut random);
+        let mut whole = rays(&triangles, 100, &mut random);
         for distance in [10.0, 1e3, 1e5, 1e7] {
-            for _ in 0..40 {
+            for _ in 0..20 {
                 let origin = random.point() * distance * scale;
                 let towards = (random.of(&triangles).0[0] - origin) / scale;
                 whole.extend(Ray::half_line(origin, towards * random.of(&[1.0, 0.01, 37.0])));

@@ -161,3 +161,29 @@ impl<'a, T: FromFile> Polygons<'a, T> {
         self.flat.extend(corners.iter().map(|corner| DVec2::new(corner[u], corner[v])));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_core::Triangle;
+
+    #[test]
+    fn polygons_that_take_too_many_steps_are_fans_until_all_together_take_too_long() {
+        // It crosses itself everywhere.
+        let zigzag =
+            |i: u32| DVec3::new((i * 7919 % 65536).into(), (i * 10_473 % 65537).into(), 0.0);
+        let vertices: Vec<DVec3> = (0..1 << 10).map(zigzag).collect();
+        let corners: Vec<u32> = (0..1 << 10).collect();
+        let most = most_steps(1 << 10);
+        let mut polygons = Polygons::<Triangle> { steps: 3 * most, ..Polygons::new(&vertices) };
+        let rejected = loop {
+            if let Err(message) = polygons.add(&corners) {
+                break message;
+            }
+        };
+        assert!(rejected.starts_with("1024 vertices that are not convex"), "{rejected}");
+        // No polygon takes more than its most steps.
+        assert!((3..30).contains(&polygons.crossing), "{}", polygons.crossing);
+        assert_eq!(polygons.triangles.len(), polygons.crossing * (corners.len() - 2));
+    }
+}

@@ -296,7 +296,7 @@ mod tests {
     use super::*;
     use bvh_build::{Builder, muller_fellner};
     use bvh_config::Check;
-    use bvh_core::{Node, Triangle};
+    use bvh_core::{Node, Sphere, Triangle};
 
     /// Returns the segments of rays through four triangles whose corners are multiples of `unit`.
     fn segments_at_scale(unit: f32) -> Vec<[[f32; 3]; 2]> {
@@ -328,10 +328,13 @@ mod tests {
     }
 
     #[test]
-    fn fewer_rays_of_every_kind_are_traced_where_all_of_them_meet_all_objects() {
-        let triangle = Triangle::from([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
-        let objects = Primitives::Triangles(vec![triangle; 30_000]);
-        let leaf = Node::leaf(triangle.aabb(), 0, 30_000);
+    fn fewer_rays_of_every_kind_are_traced_where_all_of_them_test_all_objects() {
+        let sphere = Sphere { center: Vec3::splat(0.5), radius: 0.5 };
+        // The others are soon missed.
+        let mut spheres = vec![Sphere { radius: 0.01, ..sphere }; 30_000];
+        spheres[0] = sphere;
+        let objects = Primitives::Spheres(spheres);
+        let leaf = Node::leaf(sphere.aabb(), 0, 30_000);
         let tree = Bvh { nodes: vec![leaf], prim_ids: (0..30_000).collect(), ..Bvh::default() };
         let rays = of_anything(10_000, &objects, &tree, 1, &|| false);
         let begins_inside = |traced: &&TracedRay| {
