@@ -2,52 +2,73 @@
 
 use super::BakeArgs;
 use super::effort::Effort;
+use super::plan::Plan;
 use crate::Error;
 use crate::answer::{Answer, frame_facts, gain, saved, whole};
-use crate::arguments::quoted;
+use crate::arguments::{greedy, quoted};
 use crate::interrupt::is_interrupted;
+use bvh_core::Bvh;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_search::{Bake, Baked, Chosen, Division, Outcome, StopReason};
+use bvh_search::{Bake, Baked, Chosen, Division, Open, Outcome, StopReason};
 use glam::DMat3;
 use std::path::Path;
 use std::time::Duration;
 
-/// What the greedy tree along the file's axes costs, if there was one.
+/// What the greedy tree along the file's axes costs.
 pub struct Greedy {
     /// The total area of inner nodes, which the documentation compares.
-    pub area: Option<f64>,
+    area: f64,
     /// The tests per ray in the wide layout.
-    pub tests: Option<f64>,
+    tests: Option<f64>,
+}
+
+impl Greedy {
+    /// Measures the tree along the file's axes, by the one along those of the scene.
+    pub fn of(
+        tree: &Bvh,
+        scene: &Scene,
+        chosen: &Chosen,
+        open: &Open,
+        seed: u64,
+    ) -> Result<Self, Error> {
+        let (area, tests) = if is_turned(scene) && !is_interrupted() {
+            let plain = greedy(scene)?;
+            let tests = chosen.tests_along(open, seed, &plain, &is_interrupted);
+            let traced = |source| Error::Tracing { scene: scene.name.clone(), source };
+            (internal_area(&plain), tests.map_err(traced)?)
+        } else {
+            (internal_area(tree), Some(chosen.tests_per_ray(tree)))
+        };
+        Ok(Self { area, tests: tests.filter(|_| scene.has_triangles()) })
+    }
 }
 
 /// The result of a search, with what its file and its summary need.
 pub struct Found<'a> {
-    /// The search without its choices.
-    pub bake: Bake<'a>,
-    pub effort: Option<Effort>,
+    pub plan: &'a Plan,
     pub scene: &'a Scene,
     pub chosen: Chosen,
     /// Whether the tree is a trial that the user interrupted.
     pub is_tried: bool,
     pub baked: Baked,
-    pub greedy: Greedy,
+    pub greedy: Option<Greedy>,
     pub work: u64,
     /// The time since the command began.
     pub seconds: f64,
 }
 
 /// Returns whether the boxes lie along other axes than the file's.
-pub fn is_turned(scene: &Scene) -> bool {
+fn is_turned(scene: &Scene) -> bool {
     scene.frame.is_some_and(|frame| frame.rotation() != DMat3::IDENTITY)
 }
 
 impl Found<'_> {
     /// The search with all its choices.
     pub fn settled(&self) -> Bake<'_> {
-        self.chosen.bake(&self.bake)
+        self.chosen.bake(&self.plan.bake(self.scene))
     }
 
     /// Writes the file of the tree. Returns its number of bytes.
@@ -119,7 +140,7 @@ impl Found<'_> {
     }
 
     fn summarise(&self, answer: &mut Answer) {
-        let Found { bake, scene, chosen, baked, greedy, seconds, .. } = self;
+        let Found { plan, scene, chosen, baked, greedy, seconds, .. } = self;
         let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
         let method = self.settled().name();
         let objects = scene.boxes.len();
@@ -129,19 +150,19 @@ impl Found<'_> {
             scene.name,
             scene.kind,
             whole(objects),
-            bake.seed
+            plan.seed
         ));
         answer.record("scene", scene.name.as_str());
         answer.record("method", method);
         answer.record("objects", objects);
         answer.record("references", references);
         answer.record("frame", frame_facts(tree.frame.as_ref()));
-        answer.record("seed", bake.seed);
+        answer.record("seed", plan.seed);
         let area = internal_area(tree);
         answer.record("area", area);
-        if let Some(base) = greedy.area {
+        if let Some(Greedy { area: base, tests }) = *greedy {
             let mut gains = format!("{} area of inner nodes", gain(area, base));
-            if let Some(base) = greedy.tests {
+            if let Some(base) = tests {
                 let tests = chosen.tests_per_ray(tree);
                 gains = format!("{} tests of rays, {gains}", gain(tests, base));
                 answer.record("tests_saved", saved(tests, base));
@@ -173,12 +194,12 @@ impl Found<'_> {
             answer.say(&format!("{} references to {} objects", whole(references), whole(objects)));
         } else if baked.division == Division::Useless {
             answer.say("no object is divided, because no spatial split saves anything");
-        } else if bake.references > 1.0 {
+        } else if plan.references > 1.0 {
             answer.say("no object is divided, because no division paid within the budget");
         }
         // A method that plans its time completes its plan just before the time is over, and then could
         // have used more.
-        let limit = if let Some(Effort::Time(limit)) = self.effort { limit } else { Duration::MAX };
+        let limit = if let Some(Effort::Time(limit)) = plan.effort { limit } else { Duration::MAX };
         let why = match stop {
             StopReason::Completed if *seconds < 0.5 * limit.as_secs_f64() => {
                 ", and the method has completed"

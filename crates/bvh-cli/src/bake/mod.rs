@@ -4,21 +4,22 @@ mod effort;
 mod found;
 pub mod parts;
 mod plan;
+mod search;
 mod watch;
 
 use crate::Error;
 use crate::answer::Answer;
 use crate::arguments::named;
-use crate::interrupt::hold;
-use crate::rays::Rays;
-use bvh_core::Aabb;
+use crate::interrupt::{hold, is_interrupted};
 use bvh_core::cost::Objective;
 use bvh_core::export::Target;
+use bvh_core::{Aabb, Frame};
 use bvh_scenes::files::Reserved;
 use bvh_scenes::{Precision, Scene};
-use bvh_search::{Frames, Method, Open, shortcuts};
+use bvh_search::{Choice, Frames, Method, Reason, shortcuts};
 use clap::Args;
 use effort::Effort;
+use plan::Prepared;
 use std::path::PathBuf;
 use watch::Watch;
 
@@ -115,28 +116,41 @@ const BEST: &str = "best";
 pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     // A budget of time is the whole wait.
     let watch = Watch::new(args.budget);
-    let out = args.out()?;
-    let mut plan = args.plan()?;
-    let scene = args.scene(&plan)?;
-    let start = args.start(&scene, &mut plan, answer)?;
-    let start = start.as_ref();
+    let prepared = plan::prepare(args, answer)?;
     hold();
-    let scene = args.turned(&plan, scene, start, &watch, answer);
+    let frame = frame(args, &prepared, &watch, answer);
+    let Prepared { out, scene, start, plan } = prepared;
+    let scene = scene.in_frame(frame);
     if args.explain {
         explain(&scene, answer)?;
     }
-    let anywhere = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
-        Rays::Default.density(&scene, tree, 1, seed, is_over)
-    };
-    let open = args.open(&anywhere);
     // Reserving the file first reports a full disk before the search and not after it.
-    let chosen = if open.references { Open::REFERENCES } else { 1.0 };
-    let bytes = plan::most_bytes(&scene, plan.references.max(chosen));
-    let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
-    let found = plan.search(&scene, start, &open, watch, answer)?;
+    let reserved = Reserved::new(&out, plan.most_bytes(&scene), args.out.is_none())?;
+    let found = plan.search(&scene, start.as_ref(), watch, answer)?;
     found.save(&out, reserved, answer)?;
     found.next(args, &out, answer);
     Ok(())
+}
+
+/// Returns the frame of the tree to start from, or the best one, and says why it is.
+fn frame(args: &BakeArgs, of: &Prepared, watch: &Watch, answer: &mut Answer) -> Option<Frame> {
+    let Prepared { scene, start, plan, .. } = of;
+    if let Some(start) = start {
+        return start.tree.frame;
+    }
+    let is_free = matches!(args.method, Method::Best(_)) && args.tracer.is_none();
+    let frames = if is_free { args.frame.unwrap_or_default() } else { Frames::File };
+    let budget = plan.budget(scene.boxes.len());
+    let choice = Choice::of_shapes(&scene.primitives, frames, budget, watch)?;
+    if frames == Frames::Auto && !is_interrupted() {
+        watch.bar.suspend(|| answer.say(&Reason::Frame(choice).to_string()));
+    }
+    if args.explain && choice.agreeing > 0.0 {
+        let percent = 100.0 * choice.agreeing;
+        let line = format!("frame: {percent:.0} % of the triangles, by size, share their axes");
+        answer.line("explanation", line);
+    }
+    choice.frame
 }
 
 fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), Error> {

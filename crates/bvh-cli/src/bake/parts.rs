@@ -3,18 +3,16 @@
 
 use super::BakeArgs;
 use super::found::Found;
-use super::plan::{Plan, Start, most_bytes};
+use super::plan::{self, Plan, Prepared, Start};
 use super::watch::Watch;
 use crate::Error;
 use crate::answer::{Answer, gain, short, whole};
-use crate::arguments::load_scene;
 use crate::interrupt::is_interrupted;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
 use bvh_scenes::files::{Reserved, WriteError};
 use bvh_scenes::tree_file;
-use bvh_scenes::{Precision, Scene, fnv1a};
-use bvh_search::Open;
+use bvh_scenes::{Scene, fnv1a};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -43,13 +41,7 @@ impl Part {
 
 /// Lists the parts, bakes one part, or bakes the missing parts and joins all.
 pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Error> {
-    let out = args.out()?;
-    let plan = args.plan()?;
-    if args.precision()? == Precision::Double {
-        let accepted = "--precision single";
-        return Err(Error::Usage(format!("--parts {count} in double; accepted: {accepted}")));
-    }
-    let scene = load_scene(&args.scene, Precision::Single)?;
+    let Prepared { out, scene, plan, .. } = plan::prepare(args, answer)?;
     let parts = parts(&plan, &scene, count)?;
     if args.list {
         for (number, Part { id, objects, plan }) in (1..).zip(&parts) {
@@ -76,7 +68,7 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
         }
         let scene = part.scene(&scene);
         let watch = Watch::new(part.plan.effort);
-        let found = part.plan.search(&scene, None, &Open::default(), watch, answer)?;
+        let found = part.plan.search(&scene, None, watch, answer)?;
         // A part whose search was cut short would differ from run to run.
         if is_interrupted() {
             let folder = folder.display();
@@ -89,12 +81,10 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
     if args.part.is_some() {
         return Ok(());
     }
-    let bytes = most_bytes(&scene, plan.references);
-    let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
+    let reserved = Reserved::new(&out, plan.most_bytes(&scene), args.out.is_none())?;
     let start = join(&scene, &parts, &folder)?;
     let plan = plan.share(1.0 - SHARE_OF_PARTS);
-    let found =
-        plan.search(&scene, Some(&start), &Open::default(), Watch::new(plan.effort), answer)?;
+    let found = plan.search(&scene, Some(&start), Watch::new(plan.effort), answer)?;
     found.save(&out, reserved, answer)
 }
 
