@@ -105,7 +105,9 @@ impl MortonOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_core::validate;
+    use bvh_core::cost::Area;
+    use bvh_core::glam::Vec3;
+    use bvh_core::{Node, validate};
     use proptest::prelude::*;
 
     fn cube(low: [f32; 3], size: f32) -> Aabb {
@@ -148,6 +150,28 @@ mod tests {
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             assert_eq!(pool.install(|| Config::default().build(&boxes).unwrap()), tree);
+        }
+    }
+
+    #[test]
+    fn the_scale_changes_no_tree_with_or_without_a_measure() {
+        for measure in [None, Some(&Area as &dyn Measure)] {
+            let tree = |exponent: i32| {
+                let scaled = |corner: Vec3| corner * 2f32.powi(exponent);
+                let boxes: Vec<Aabb> = scatter(500)
+                    .iter()
+                    .map(|aabb| Aabb { min: scaled(aabb.min), max: scaled(aabb.max) })
+                    .collect();
+                Config::default().build_watched(&boxes, measure, &Watch::default()).unwrap()
+            };
+            let topology = |tree: &Bvh| {
+                let children: Vec<_> = tree.nodes.iter().map(Node::children).collect();
+                (children, tree.prim_ids.clone())
+            };
+            // The areas of the largest boxes are too large for f32, those of the smallest too small.
+            for exponent in [-100, 90] {
+                assert_eq!(topology(&tree(exponent)), topology(&tree(0)), "2^{exponent}");
+            }
         }
     }
 
