@@ -3,7 +3,6 @@
 use crate::Error;
 use bvh_scenes::files::read_text;
 pub use bvh_scenes::files::write;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 use std::fs;
@@ -22,10 +21,4 @@ pub fn names(folder: &Path) -> Result<BTreeSet<String>, Error> {
 /// Reads a TOML file that a harness has written.
 pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     toml::from_str(&read_text(path)?).map_err(Error::toml(path))
-}
-
-/// Serialises `value` as TOML.
-pub fn to_toml(value: &impl Serialize) -> Result<String, Error> {
-    toml::to_string(value)
-        .map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))
 }

@@ -16,6 +16,5 @@ pub mod rows;
 pub mod run;
 pub mod spec;
 pub mod statistics;
-pub mod stress;
 
 pub use error::Error;

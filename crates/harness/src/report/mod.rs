@@ -15,6 +15,7 @@ pub mod query;
 mod query_column;
 pub mod query_measure;
 pub mod query_report;
+pub(crate) mod suite;
 pub mod trials;
 
 use crate::Error;
@@ -144,9 +145,33 @@ impl Report {
     }
 }
 
-/// Makes all reports from the CSV files in a folder; the comparison with the paper is last. Writes
-/// nothing.
-pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
+/// Makes all reports from the CSV files in the store's folder, as [`outputs`] does, and writes them
+/// there, figures as SVG. Returns the text for the terminal.
+pub fn write(
+    reports: &[Report],
+    of_suite: bool,
+    store: &Store,
+    is_quick: bool,
+) -> Result<String, Error> {
+    let outputs = outputs(reports, of_suite, store.folder())?;
+    for output in &outputs {
+        for (name, bytes) in &output.csv {
+            store.write(&format!("{name}.csv"), bytes)?;
+        }
+        // Only the rows of quick variants are ever read, so they need no figures.
+        for (name, figure) in output.figures.iter().filter(|_| !is_quick) {
+            store.write(&format!("{name}.svg"), figures::svg(figure).as_bytes())?;
+        }
+    }
+    outputs.iter().map(Output::text).collect()
+}
+
+/// Makes all reports from the CSV files in a folder; the comparison with the paper is last. The
+/// suite of cases has one report of its own instead. Writes nothing.
+pub fn outputs(reports: &[Report], of_suite: bool, folder: &Path) -> Result<Vec<Output>, Error> {
+    if of_suite {
+        return Ok(vec![suite::output(folder)?]);
+    }
     let mut rows = Rows::read(folder)?;
     let mut outputs = Vec::new();
     for report in reports {
@@ -168,20 +193,6 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
         outputs.push(beside_paper(&paper)?);
     }
     Ok(outputs)
-}
-
-/// Writes the output of reports into the store's folder; figures, as SVG, only if `drawn` is true.
-/// Returns the text for the terminal.
-pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<String, Error> {
-    for output in outputs {
-        for (name, bytes) in &output.csv {
-            store.write(&format!("{name}.csv"), bytes)?;
-        }
-        for (name, figure) in output.figures.iter().filter(|_| drawn) {
-            store.write(&format!("{name}.svg"), figures::svg(figure).as_bytes())?;
-        }
-    }
-    outputs.iter().map(Output::text).collect()
 }
 
 /// Returns the table of final costs, for experiments without reports.

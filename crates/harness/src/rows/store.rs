@@ -12,6 +12,7 @@ use super::{Row, to_bytes};
 use crate::Error;
 use crate::files;
 use bvh_scenes::files::read_text;
+use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -56,15 +57,20 @@ impl Store {
         Ok(Self { folder, partial, _lock: lock })
     }
 
-    /// Creates and locks `folder` for the experiment whose resolved spec is the text `resolved`. If
-    /// the folder has finished runs of an interrupted experiment, `existing` decides: they are
-    /// resumed, which requires the same resolved spec, or discarded, or the folder is rejected.
+    /// Creates and locks `folder` for the experiment with this resolved spec. If the folder has
+    /// finished runs of an interrupted experiment, `existing` decides: they are resumed, which
+    /// requires the same resolved spec, or discarded, or the folder is rejected.
     ///
     /// # Errors
     ///
     /// If another harness has locked the folder, if its finished runs may be neither resumed nor
     /// discarded, or if the folder cannot be read or written.
-    pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
+    pub fn open(
+        folder: &Path,
+        resolved: &impl Serialize,
+        existing: Existing,
+    ) -> Result<Self, Error> {
+        let resolved = to_toml(resolved)?;
         let store = Self::lock(folder)?;
         // The spec is kept with the runs, because a run of another spec must never be resumed.
         let spec = store.partial.join(SPEC);
@@ -196,6 +202,11 @@ impl Store {
         self.write(R::FILE, &to_bytes(rows, Path::new(R::FILE))?)
     }
 
+    /// Writes a value as a TOML file.
+    pub fn write_toml(&self, name: &str, value: &impl Serialize) -> Result<(), Error> {
+        self.write(name, to_toml(value)?.as_bytes())
+    }
+
     /// Writes another file of the results.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         Ok(files::write(&self.folder.join(name), bytes)?)
@@ -211,6 +222,11 @@ impl Store {
 /// The file of a part in this folder with the resolved spec of its runs.
 pub fn spec_of_part(folder: &Path) -> PathBuf {
     folder.join(".partial").join(SPEC)
+}
+
+fn to_toml(value: &impl Serialize) -> Result<String, Error> {
+    toml::to_string(value)
+        .map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))
 }
 
 fn run_file_name(index: usize) -> String {
@@ -237,6 +253,7 @@ pub fn finished_spec(folder: &Path) -> Result<Option<String>, Error> {
 mod tests {
     use super::*;
     use std::io::ErrorKind;
+    use toml::Table;
 
     // The tests `faults` and `protection` run the program on folders that are in use, unfinished or
     // blocked.
@@ -257,7 +274,7 @@ mod tests {
     fn a_part_with_another_result_of_a_kept_run_is_rejected_and_other_seconds_are_not() {
         let folders = ["a", "b"].map(|_| tempfile::tempdir().unwrap());
         let [kept, part] =
-            [0, 1].map(|i| Store::open(folders[i].path(), "", Existing::Keep).unwrap());
+            [0, 1].map(|i| Store::open(folders[i].path(), &Table::new(), Existing::Keep).unwrap());
         let run = |cost, seconds| run([("runs.csv", &*named(cost).0), ("timing.csv", seconds)]);
         let names = [named(1).1];
         kept.keep(0, &run(1, "0.1\n")).unwrap();
@@ -271,7 +288,7 @@ mod tests {
     #[test]
     fn a_kept_run_that_is_emptied_cut_edited_or_no_file_is_refused_and_done_again() {
         let out = tempfile::tempdir().unwrap();
-        let store = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap();
+        let store = Store::open(&out.path().join("x"), &Table::new(), Existing::Keep).unwrap();
         let (rows, name) = named(12);
         let run = run([("runs.csv", &*rows), ("history.csv", "a\n1\n")]);
         let file = store.run_file(0);
@@ -300,19 +317,19 @@ mod tests {
     fn finished_runs_are_not_discarded_because_their_spec_cannot_be_read() {
         let out = tempfile::tempdir().unwrap();
         let folder = out.path().join("x");
-        Store::open(&folder, "", Existing::Keep)
+        Store::open(&folder, &Table::new(), Existing::Keep)
             .unwrap()
             .keep(0, &run([("runs.csv", "a\n1\n")]))
             .unwrap();
         let spec = folder.join(".partial").join(SPEC);
         fs::write(&spec, [0xff]).unwrap();
         for existing in [Existing::Keep, Existing::Resume] {
-            let error = Store::open(&folder, "", existing).unwrap_err();
+            let error = Store::open(&folder, &Table::new(), existing).unwrap_err();
             let Error::Read(error) = error else { panic!("{error}") };
             assert_eq!((error.kind(), error.path), (ErrorKind::InvalidData, spec.clone()));
         }
         assert!(folder.join(".partial/000000.run").is_file());
-        Store::open(&folder, "", Existing::Replace).unwrap();
+        Store::open(&folder, &Table::new(), Existing::Replace).unwrap();
         assert!(!folder.join(".partial/000000.run").exists());
     }
 }

@@ -5,9 +5,8 @@ use super::jobs::{Job, Jobs};
 use super::measurement::Measurement;
 use super::resolved::Resolved;
 use crate::Error;
-use crate::files::to_toml;
 use crate::rows::kept_run::RunName;
-use crate::rows::store::{Existing, Store, finished_spec};
+use crate::rows::store::{Existing, Store};
 use crate::spec::Experiment;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -35,15 +34,14 @@ pub fn execute(
     if !extent.runs.is_empty() {
         reject_indivisible(experiment)?;
     }
+    let run = || run(experiment, out, extent, interrupted);
     // Without the key the program's pool serves, which `--jobs` has sized.
-    let Some(threads) = experiment.threads else {
-        return run(experiment, out, extent, interrupted);
-    };
+    let Some(threads) = experiment.threads else { return run() };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.into())
         .build()
         .map_err(|error| Error::Usage(format!("threads = {threads}: {error}")))?;
-    pool.install(|| run(experiment, out, extent, interrupted))
+    pool.install(run)
 }
 
 /// Returns an error if several processes cannot share the experiment.
@@ -68,7 +66,7 @@ fn run(
     let resolved = Resolved::new(experiment, &scenes);
     let folder = out.join(experiment.folder());
     let mut summary = Summary { skipped_scenes, folder, ..Summary::default() };
-    if is_finished(&summary.folder, &resolved, existing, is_part)? {
+    if resolved.is_finished(&summary.folder, existing, is_part)? {
         summary.text = "All runs are finished; nothing was done. \
                         --force repeats them, --redraw makes the reports again.\n"
             .into();
@@ -76,7 +74,13 @@ fn run(
     }
     // Neither an unknown identifier nor a base that cannot be built leaves a folder.
     let jobs = Jobs::new(experiment, &scenes, ids, interrupted)?;
-    let store = open(&jobs, &resolved, out, existing, parts)?;
+    let parts: Vec<PathBuf> = parts.iter().map(|part| part.join(experiment.folder())).collect();
+    reject_own_part(&summary.folder, out, &parts)?;
+    let store = Store::open(&summary.folder, &resolved, existing)?;
+    let names: Vec<RunName> = jobs.list.iter().map(Job::name).collect();
+    for part in &parts {
+        store.adopt(part, &names)?;
+    }
     summary.remarks.extend(scenes.iter().filter_map(|scene| scene.remark.clone()));
     // The subsets of one mesh share its remark.
     summary.remarks.dedup();
@@ -91,59 +95,14 @@ fn run(
     Ok(summary)
 }
 
-/// Opens the experiment's folder in `out`, and takes the runs of the parts.
-fn open(
-    jobs: &Jobs,
-    resolved: &Resolved,
-    out: &Path,
-    existing: Existing,
-    parts: &[PathBuf],
-) -> Result<Store, Error> {
-    let folder = out.join(resolved.experiment.folder());
-    let parts: Vec<PathBuf> =
-        parts.iter().map(|part| part.join(resolved.experiment.folder())).collect();
-    // A part that is discarded or finished would lose its runs. Symbolic links and `..` may hide
-    // that two paths are the same folder.
+/// Returns an error if a part, which would lose its runs if it is discarded or finished, is also the
+/// experiment's folder in `out`. Symbolic links and `..` may hide that two paths are the same folder.
+fn reject_own_part(folder: &Path, out: &Path, parts: &[PathBuf]) -> Result<(), Error> {
     if let Ok(folder) = folder.canonicalize()
         && parts.iter().any(|part| part.canonicalize().is_ok_and(|part| part == folder))
     {
         let out = out.display();
         return Err(Error::Usage(format!("--out {out} is also one of the parts; choose another")));
     }
-    let store = Store::open(&folder, &to_toml(resolved)?, existing)?;
-    let names: Vec<RunName> = jobs.list.iter().map(Job::name).collect();
-    for part in &parts {
-        store.adopt(part, &names)?;
-    }
-    Ok(store)
-}
-
-/// Returns true if a folder already holds all requested results.
-///
-/// Finished results may also cover optional scenes that are missing now. Resuming them leaves
-/// nothing to do.
-///
-/// # Errors
-///
-/// If the folder holds finished results that are neither replaced nor resumed.
-fn is_finished(
-    folder: &Path,
-    resolved: &Resolved,
-    existing: Existing,
-    is_part: bool,
-) -> Result<bool, Error> {
-    let recorded = match existing {
-        Existing::Replace => None,
-        _ => finished_spec(folder)?,
-    };
-    let Some(text) = recorded else { return Ok(false) };
-    let is_same = toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found));
-    let found = match (is_same, existing == Existing::Resume && !is_part) {
-        (true, true) => return Ok(true),
-        (true, false) => "finished results",
-        (false, _) => "the results of another spec, scene or seed",
-    };
-    let folder = folder.display();
-    let message = format!("{folder} has {found}, --force replaces them, another --out keeps them");
-    Err(Error::Usage(message))
+    Ok(())
 }

@@ -2,7 +2,7 @@
 //! reports.
 
 use crate::Error;
-use crate::files::{read_toml, to_toml};
+use crate::files::read_toml;
 use crate::report;
 use crate::report::output::Output;
 use crate::rows::store::{self, Store};
@@ -10,7 +10,6 @@ use crate::run::provenance::Provenance;
 use crate::run::reference;
 use crate::run::resolved::Resolved;
 use crate::spec::Experiment;
-use crate::stress;
 use bvh_scenes::files::read_text;
 use std::path::{Path, PathBuf};
 
@@ -38,12 +37,16 @@ pub(crate) fn conclude(
     let processors = store.join(resolved.run_count())?;
     let are_unlike = processors.len() > 1;
     let provenance = Provenance::gather(processors);
-    let text = report(resolved, out, &provenance, &store);
+    // Reports read references, so these are updated first.
+    reference::update(resolved, out, &provenance.revision, &store)?;
+    let experiment = &resolved.experiment;
+    let text =
+        report::write(&experiment.reports, experiment.suite.is_some(), &store, experiment.quick);
     // A mistake in a report must not cost the runs: `--redraw` makes the reports again.
     if matches!(text, Ok(_) | Err(Error::Query { .. })) {
-        store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
+        store.write_toml("resolved.toml", resolved)?;
         // Provenance comes last, so that it describes results that are complete.
-        store.write("provenance.toml", to_toml(&provenance)?.as_bytes())?;
+        store.write_toml("provenance.toml", &provenance)?;
         store.finish()?;
     }
     summary.text.insert_str(0, &text?);
@@ -54,33 +57,11 @@ pub(crate) fn conclude(
     Ok(())
 }
 
-/// Improves the best known costs and makes the reports of joined rows. Returns the text for the
-/// terminal.
-fn report(
-    resolved: &Resolved,
-    out: &Path,
-    provenance: &Provenance,
-    store: &Store,
-) -> Result<String, Error> {
-    // Reports read references, so these are updated first.
-    reference::update(resolved, out, &provenance.revision, store)?;
-    let made = outputs(&resolved.experiment, store.folder())?;
-    // Only the rows of quick variants are ever read, so they need no figures.
-    report::write_all(&made, store, !resolved.experiment.quick)
-}
-
-fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Error> {
-    match &experiment.suite {
-        Some(_) => Ok(vec![stress::output(folder)?]),
-        None => report::outputs(&experiment.reports, folder),
-    }
-}
-
 /// Reads the spec of a finished experiment from its folder, and makes its reports again. Writes
 /// nothing.
 pub fn remade(folder: &Path) -> Result<(Experiment, Vec<Output>), Error> {
     let Resolved { experiment, .. } = read_toml(&folder.join("resolved.toml"))?;
-    let outputs = outputs(&experiment, folder)?;
+    let outputs = report::outputs(&experiment.reports, experiment.suite.is_some(), folder)?;
     Ok((experiment, outputs))
 }
 
@@ -123,7 +104,9 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     }
     // The rows are still the output of the program that ran, so its provenance is kept.
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
-    let text = report(&resolved, out, &provenance, &store)?;
-    store.write("resolved.toml", to_toml(&resolved)?.as_bytes())?;
+    reference::update(&resolved, out, &provenance.revision, &store)?;
+    let text =
+        report::write(&experiment.reports, experiment.suite.is_some(), &store, experiment.quick)?;
+    store.write_toml("resolved.toml", &resolved)?;
     Ok(Summary { text, folder, ..Summary::default() })
 }

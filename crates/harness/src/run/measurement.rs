@@ -2,13 +2,11 @@
 
 use super::finish::Summary;
 use super::jobs::Jobs;
-use super::{ray_cost, runs, trace};
+use super::{ray_cost, runs, suite, trace};
 use crate::Error;
 use crate::measure::ray_cost::Config;
 use crate::rows::store::Store;
 use crate::spec::Experiment;
-use crate::stress;
-use bvh_search::Observer;
 use bvh_stress::Effort;
 use toml::Table;
 
@@ -39,7 +37,6 @@ impl Experiment {
 impl Measurement<'_> {
     /// Writes the rows, and adds to the summary what the terminal shows.
     pub fn take(&self, jobs: &Jobs, store: &Store, summary: &mut Summary) -> Result<(), Error> {
-        let Experiment { scenes, methods, .. } = jobs.experiment;
         match self {
             Self::Runs => {
                 let all = jobs.experiment.measurements();
@@ -48,9 +45,7 @@ impl Measurement<'_> {
             }
             Self::Traced(keys) => trace::measure(keys, jobs, store, summary),
             Self::RayCost(config) => ray_cost::measure(config, jobs, store),
-            Self::Suite(effort) => {
-                stress::execute(effort, scenes, methods, store, &|| jobs.watch.cancelled())
-            }
+            Self::Suite(effort) => suite::measure(effort, jobs, store),
         }
     }
 

@@ -13,5 +13,6 @@ mod ray_cost;
 pub mod reference;
 pub mod resolved;
 mod runs;
+mod suite;
 mod trace;
 mod watch;

@@ -1,8 +1,11 @@
 //! The resolved spec of an experiment: every default spelled out, and the scenes it runs on.
 
+use crate::Error;
+use crate::rows::store::{Existing, finished_spec};
 use crate::spec::Experiment;
 use bvh_scenes::Scene;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Contents of `resolved.toml`.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -39,7 +42,7 @@ impl Resolved {
     }
 
     /// Returns true if `found` has the same runs, and perhaps further ones on optional scenes.
-    pub fn repeats(&self, found: &Self) -> bool {
+    fn repeats(&self, found: &Self) -> bool {
         // A machine without fetched scenes may repeat results that have them.
         let optional = &self.experiment.optional_scenes;
         let mut required = self.scenes.iter();
@@ -47,6 +50,37 @@ impl Resolved {
         found.has_runs_of(&self.experiment)
             && required.all(|scene| found.scenes.contains(scene))
             && recorded.all(|scene| self.scenes.contains(scene) || optional.contains(&scene.name))
+    }
+
+    /// Returns true if a folder already holds all requested results.
+    ///
+    /// Finished results may also cover optional scenes that are missing now. Resuming them leaves
+    /// nothing to do.
+    ///
+    /// # Errors
+    ///
+    /// If the folder holds finished results that are neither replaced nor resumed.
+    pub fn is_finished(
+        &self,
+        folder: &Path,
+        existing: Existing,
+        is_part: bool,
+    ) -> Result<bool, Error> {
+        let recorded = match existing {
+            Existing::Replace => None,
+            _ => finished_spec(folder)?,
+        };
+        let Some(text) = recorded else { return Ok(false) };
+        let is_same = toml::from_str(&text).is_ok_and(|found| self.repeats(&found));
+        let found = match (is_same, existing == Existing::Resume && !is_part) {
+            (true, true) => return Ok(true),
+            (true, false) => "finished results",
+            (false, _) => "the results of another spec, scene or seed",
+        };
+        let folder = folder.display();
+        Err(Error::Usage(format!(
+            "{folder} has {found}, --force replaces them, another --out keeps them"
+        )))
     }
 
     /// The number of runs over all scenes.
@@ -58,9 +92,8 @@ impl Resolved {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{read_toml, to_toml};
+    use crate::files::read_toml;
     use std::fs;
-    use std::path::Path;
     use toml::Table;
 
     #[test]
@@ -75,7 +108,7 @@ mod tests {
             let resolved: Resolved = read_toml(&path).unwrap();
             // The program in attic/ leaves other keys out.
             if resolved.experiment.tracing.is_none() {
-                let written: Table = toml::from_str(&to_toml(&resolved).unwrap()).unwrap();
+                let written: Table = toml::from_str(&toml::to_string(&resolved).unwrap()).unwrap();
                 // A new key is left out while it has its default: see `per_processor`.
                 assert_eq!(written, read_toml::<Table>(&path).unwrap(), "{path:?}");
             }

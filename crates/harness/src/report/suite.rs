@@ -1,51 +1,19 @@
-//! The measurement of the suite of stiff and extreme cases, which `bvh_stress` declares and checks.
-//!
-//! Only the commands and specs that run the suite know it.
+//! The report of the suite of stiff and extreme cases, which `bvh_stress` declares and checks.
 
+use super::data::distinct;
+use super::output::{Output, panel};
 use crate::Error;
-use crate::contestant::{Contestant, Labelled};
-use crate::report::data::distinct;
-use crate::report::output::{Output, panel};
-use crate::rows::store::Store;
 use crate::rows::{read, to_bytes};
-use bvh_search::Method;
-use bvh_stress::{CASES, Case, Cell, Class, Effort, KINDS};
+use bvh_stress::{Cell, Class, KINDS};
 use figures::{Axis, Layer, Marks, Panel, Unit};
-use rayon::prelude::*;
 use std::path::Path;
 
-/// Runs the cases (all if none are named) and writes rows.
-pub fn execute(
-    effort: &Effort,
-    cases: &[String],
-    methods: &[Labelled],
-    store: &Store,
-    interrupted: &(dyn Fn() -> bool + Sync),
-) -> Result<(), Error> {
-    let cases: Vec<&Case> = CASES
-        .iter()
-        .filter(|case| cases.is_empty() || cases.iter().any(|id| id == case.id))
-        .collect();
-    // Specs accept only methods of ours here.
-    let methods: Vec<(String, Method)> = methods
-        .iter()
-        .filter_map(|Labelled { label, method, .. }| match method {
-            Contestant::Ours(method) => Some((label.clone(), method.clone())),
-            _ => None,
-        })
-        .collect();
-    let runs = cases.len();
-    let cells = cases.par_iter().map(|case| match interrupted() {
-        true => Err(Error::Interrupted { finished: 0, runs }),
-        false => Ok(case.cells(&methods, effort)),
-    });
-    let cells = cells.collect::<Result<Vec<_>, Error>>()?.concat();
-    store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)
-}
+/// The file of the suite's rows.
+pub(crate) const CELLS: &str = "cells.csv";
 
 /// Makes the summary, the table of broken promises and the figure from the rows in the folder.
-pub fn output(folder: &Path) -> Result<Output, Error> {
-    let cells: Vec<Cell> = read(&folder.join("cells.csv"))?;
+pub(super) fn output(folder: &Path) -> Result<Output, Error> {
+    let cells: Vec<Cell> = read(&folder.join(CELLS))?;
     let cells_with =
         |outcome| cells.iter().filter(|cell| cell.outcome == outcome).collect::<Vec<&Cell>>();
     let broken = cells_with(Class::Broken);
@@ -61,7 +29,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     );
     let mut output = Output::new("", &title);
     if !broken.is_empty() {
-        let bytes = to_bytes(&broken, Path::new("cells.csv"))?;
+        let bytes = to_bytes(&broken, Path::new(CELLS))?;
         output.unwritten.push(("Broken promises".into(), bytes));
     }
     let methods = distinct(cells.iter().map(|cell| cell.method.as_str()));
@@ -126,7 +94,7 @@ mod tests {
         let made = |last| {
             let folder = tempfile::tempdir().unwrap();
             let cells = [cell("S01 empty", Class::Kept), cell("S02 one object", last)];
-            let path = folder.path().join("cells.csv");
+            let path = folder.path().join(CELLS);
             std::fs::write(&path, to_bytes(&cells, &path).unwrap()).unwrap();
             output(folder.path()).unwrap()
         };
