@@ -188,6 +188,23 @@ fn ranges_that_end_at_a_hit_or_next_to_it_are_answered_alike_from_near_and_from_
 }
 
 #[test]
+fn the_bytes_of_a_layout_are_those_of_its_nodes_and_of_its_blocks_of_four_triangles() {
+    let bytes = |leaves: usize| {
+        let triangles = soup(4 * leaves, &mut Random(13));
+        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+        let leaf = |i: usize| Node::leaf(Aabb::union_of(&boxes[4 * i..][..4]), 4 * i as u32, 4);
+        let root = Node::inner(Aabb::union_of(&boxes), 1, leaves as u32);
+        let nodes = [root].into_iter().chain((0..leaves).map(leaf)).collect();
+        let prim_ids = (0..triangles.len() as u32).collect();
+        WideBvh::new(&Bvh { nodes, prim_ids, ..Bvh::default() }, &triangles).unwrap().bytes()
+    };
+    let [two, three, four] = [2, 3, 4].map(bytes);
+    let block = three - two;
+    assert_eq!(four - three, block);
+    assert!(block >= 4 * size_of::<Triangle>() && two > 2 * block, "{two}, {block}");
+}
+
+#[test]
 fn rays_that_meet_a_triangle_at_the_limits_of_the_numbers_hit_it() {
     let step =
         |[x, y, z]: [u32; 3]| Vec3::new(f32::from_bits(x), -f32::from_bits(y), f32::from_bits(z));
