@@ -188,7 +188,7 @@ fn ranges_that_end_at_a_hit_or_next_to_it_are_answered_alike_from_near_and_from_
 }
 
 #[test]
-fn the_bytes_of_a_layout_are_those_of_its_nodes_and_of_its_blocks_of_four_triangles() {
+fn the_bytes_of_a_layout_are_those_of_its_nodes_and_its_triangles() {
     let bytes = |leaves: usize| {
         let triangles = soup(4 * leaves, &mut Random(13));
         let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
@@ -198,10 +198,10 @@ fn the_bytes_of_a_layout_are_those_of_its_nodes_and_of_its_blocks_of_four_triang
         let prim_ids = (0..triangles.len() as u32).collect();
         WideBvh::new(&Bvh { nodes, prim_ids, ..Bvh::default() }, &triangles).unwrap().bytes()
     };
-    let [two, three, four] = [2, 3, 4].map(bytes);
-    let block = three - two;
-    assert_eq!(four - three, block);
-    assert!(block >= 4 * size_of::<Triangle>() && two > 2 * block, "{two}, {block}");
+    let [two, three] = [2, 3].map(bytes);
+    let block = 4 * size_of::<Triangle>();
+    // A few triangles need no node, which would have eight boxes in bytes.
+    assert!(two >= 2 * block && three >= 3 * block + 8 * size_of::<Aabb>() / 4, "{two} {three}");
 }
 
 #[test]
