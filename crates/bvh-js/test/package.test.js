@@ -1,10 +1,11 @@
 // What the package promises: the library's own hits, the program's bytes, and errors that name what is wrong.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
+import { pathToFileURL } from 'node:url';
 import {
     BackSide, BatchedMesh, Box3, BoxGeometry, BufferAttribute, BufferGeometry, DoubleSide, Euler, FrontSide, Group,
     InstancedBufferGeometry, InstancedMesh, InterleavedBuffer, InterleavedBufferAttribute, Matrix3, Matrix4, Mesh,
@@ -673,4 +674,25 @@ test('wrong arguments and geometries are named', async () => {
     assert.throws(() => countTests(bvh, new Ray(), { query: 'all' }), { name: 'TypeError', message: /^query is "all"/ });
     await assert.rejects(costOf(scene()), { name: 'TypeError', message: /MeshBVH/ });
     assert.throws(() => tree.toMeshBVH(new Mesh(scene())), { name: 'TypeError', message: /^geometry is a Mesh/ });
+});
+
+test('code that `vite dev` has moved finds the installed files, and other code those beside it', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'bvh-'));
+    const installed = pathToFileURL(join(folder, 'node_modules/bvh-search/js/bake-web.js')).href;
+    const served = async (place) => {
+        mkdirSync(join(folder, place), { recursive: true });
+        copyFileSync(new URL('../js/served-web.js', import.meta.url), join(folder, place, 'served.mjs'));
+        const { served } = await import(pathToFileURL(join(folder, place, 'served.mjs')).href);
+        return served('js/bake-web.js')?.href;
+    };
+    try {
+        for (const cache of ['.vite/deps', '.cache/vite/client/deps']) {
+            assert.equal(await served(`node_modules/${cache}`), installed);
+        }
+        for (const own of ['node_modules/bvh-search/js', 'node_modules/.pnpm/a/node_modules/bvh-search/js', 'assets']) {
+            assert.equal(await served(own), undefined);
+        }
+    } finally {
+        rmSync(folder, { recursive: true });
+    }
 });

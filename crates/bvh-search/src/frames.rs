@@ -36,7 +36,7 @@ const LEAST_GAIN: f64 = 0.01;
 const WORK_PER_MOVE: f64 = 64.0;
 /// The least and the most triangles of the first sample.
 const FIRST: [usize; 2] = [64, 4096];
-/// The least within little work. Its last sample of 384 triangles still tells a tenth of the area.
+/// The least within little work. Its last sample of 384 triangles still tells a fortieth of the area.
 const LEAST: usize = 8;
 /// By what the second sample and the last one are larger than the first.
 const GROWTH: [usize; 2] = [4, 48];

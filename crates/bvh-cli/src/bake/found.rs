@@ -26,7 +26,8 @@ pub struct Greedy {
 }
 
 impl Greedy {
-    /// Measures the tree along the file's axes, by the one along those of the scene.
+    /// Measures the greedy tree along the file's axes. `tree` is the one along those of the scene, often
+    /// the same.
     pub fn of(
         tree: &Bvh,
         scene: &Scene,

@@ -132,14 +132,14 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     Ok(())
 }
 
-/// Returns the frame of the tree to start from, or the best one, and says why it is.
+/// Returns the frame of the tree to start from, or the best one, and says why it is the best.
 fn frame(args: &BakeArgs, of: &Prepared, watch: &Watch, answer: &mut Answer) -> Option<Frame> {
     let Prepared { scene, start, plan, .. } = of;
     if let Some(start) = start {
         return start.tree.frame;
     }
-    let is_free = matches!(args.method, Method::Best(_)) && args.tracer.is_none();
-    let frames = if is_free { args.frame.unwrap_or_default() } else { Frames::File };
+    let is_ours = matches!(args.method, Method::Best(_)) && args.tracer.is_none();
+    let frames = if is_ours { args.frame.unwrap_or_default() } else { Frames::File };
     let budget = plan.budget(scene.boxes.len());
     let choice = Choice::of_shapes(&scene.primitives, frames, budget, watch)?;
     if frames == Frames::Auto && !is_interrupted() {

@@ -68,7 +68,7 @@ pub fn prepare(args: &BakeArgs, answer: &mut Answer) -> Result<Prepared, Error> 
             (Some(Start { tree, work: own.work }), objective, rays, references)
         }
     };
-    // The tracers of others have a cost of their own, and all parts have the same one.
+    // The tracers of others have a cost of their own. Parts reserve no room for references.
     let is_free = args.tracer.is_none() && args.parts.is_none();
     let plan = Plan {
         method: args.method.clone(),

@@ -175,6 +175,7 @@ mod tests {
         let vertices: Vec<DVec3> = (0..1 << 10).map(zigzag).collect();
         let corners: Vec<u32> = (0..1 << 10).collect();
         let most = most_steps(1 << 10);
+        assert!(MOST_STEPS <= 128 * most);
         let mut polygons = Polygons::<Triangle> { steps: 3 * most, ..Polygons::new(&vertices) };
         let rejected = loop {
             if let Err(message) = polygons.add(&corners) {

@@ -1,4 +1,4 @@
-//! The report of the suite of stiff and extreme cases, which `bvh_stress` declares and checks.
+//! The report of the suite of stiff and extreme cases.
 
 use super::data::distinct;
 use super::output::{Output, panel};
