@@ -12,6 +12,7 @@ array([ True])
 from __future__ import annotations
 
 import gc
+import time
 from typing import Any, Protocol
 
 import numpy as np
@@ -38,6 +39,15 @@ def _collect(faces: int) -> None:
     if _faces_since_collection >= _COLLECTED and gc.isenabled():
         _faces_since_collection = faces
         gc.collect()
+
+
+def _part(
+    progress: Progress | None, begin: float, low: float, high: float
+) -> Progress | None:
+    """Returns the progress of one of several queries, whose fractions are from `low` to `high`."""
+    if progress is None:
+        return None
+    return lambda _, fraction: progress(time.monotonic() - begin, low + (high - low) * fraction)
 
 
 class _Mesh(Protocol):
@@ -126,13 +136,17 @@ class RayMeshIntersector:
         """
         rays = self._rays(ray_origins, ray_directions)
         if multiple_hits:
-            t, index_tri, index_ray = self._tracer().all(*rays, invalid="miss", progress=progress)
+            begin = time.monotonic()
+            whole = _part(progress, begin, 0, 0.8)
+            t, index_tri, index_ray = self._tracer().all(*rays, invalid="miss", progress=whole)
             misses = np.bincount(index_ray, minlength=len(rays[0])) == 0
             others = [vectors[misses] for vectors in rays]
-            touches = self._tracer().any(*others, invalid="miss", progress=progress)
+            rest = _part(progress, begin, 0.8, 1)
+            touches = self._tracer().any(*others, invalid="miss", progress=rest)
             if touches.any():
                 touched = (vectors[touches] for vectors in others)
-                nearest = self._tracer().nearest(*touched, invalid="miss", progress=progress)
+                end = _part(progress, begin, 1, 1)
+                nearest = self._tracer().nearest(*touched, invalid="miss", progress=end)
                 index_ray = np.concatenate([index_ray, np.nonzero(misses)[0][touches]])
                 order = np.argsort(index_ray, kind="stable")
                 t, index_tri = (np.concatenate(both)[order] for both in zip((t, index_tri), nearest))
