@@ -35,7 +35,7 @@ const LEAST_GAIN: f64 = 0.01;
 /// The nodes that a move visits, about.
 const WORK_PER_MOVE: f64 = 64.0;
 /// The least and the most triangles of the first sample.
-const FIRST: [usize; 2] = [64, 4096];
+const FIRST: [usize; 2] = [32, 4096];
 /// The least within little work. Its last sample of 384 triangles still tells a fortieth of the area.
 const LEAST: usize = 8;
 /// By what the second sample and the last one are larger than the first.
@@ -125,10 +125,11 @@ impl Choice {
         let moves = WORK_PER_MOVE * limit(budget.max_evaluations);
         let mut work = limit(budget.max_work).min(moves);
         if let Some(began) = began {
-            // The first price tells how long the others take, of which larger ones take longer.
+            // The first price tells how long the others take, of which larger ones take longer, and
+            // so do the greedy trees that short searches begin with, whose work does not count.
             let first = sample(triangles, CLOCKED, 1, 0);
             scene.price(&first, None);
-            let took = 2.0 * (observer.progress().unwrap_or(1.0) - began);
+            let took = 4.0 * (observer.progress().unwrap_or(1.0) - began);
             let price = took.max(f64::MIN_POSITIVE) / (WORK_PER_OBJECT * first.len() as f64);
             work = work.min(SHARE * (1.0 - began) / price);
         }

@@ -100,8 +100,8 @@ impl Observer for Clock {
 fn a_clock_gives_a_choice_the_work_that_its_first_price_tells() {
     let oblique = turned(&triangles("escher"), 1, 1.0, DVec3::ZERO);
     // A sample of 1024 triangles is priced between two looks, with 20 units of work for each. Larger
-    // samples may take twice the time per triangle.
-    let worth = |share: f64| work((20.0 * 1024.0 / (2.0 * share)) as u64);
+    // samples may take twice the time per triangle, and short searches begin with trees, too.
+    let worth = |share: f64| work((20.0 * 1024.0 / (4.0 * share)) as u64);
     for (share, finds) in [(0.001, true), (0.0005, true), (0.1, false)] {
         let choice = Choice::of(&oblique, Budget::UNLIMITED, &Clock(share, AtomicU32::new(0)));
         assert_eq!(choice, Choice::of(&oblique, worth(share), &()));
