@@ -10,7 +10,7 @@ export function startWorker() {
         // The browser says nothing of a worker that it could not fetch.
         fail: (listener) => worker.addEventListener('error', (event) => listener(new Error(event.message
             || 'the worker bake-web.js of bvh-search could not be loaded; where `vite dev` up to 7 has '
-            + "its cacheDir or bvh-search in another folder than its own node_modules, "
+            + 'its cacheDir or bvh-search in another folder than its own node_modules, '
             + "`optimizeDeps: { exclude: ['bvh-search'] }` lets it be found"))),
         end: () => worker.terminate(),
     };

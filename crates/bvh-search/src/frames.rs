@@ -29,7 +29,7 @@ const WORK_PER_OBJECT: f64 = 20.0;
 /// searched ones do not. Three times the work, over a third of the triangles, errs twice as much.
 const CONFIRMING: u64 = 20;
 /// The work per object of the last sample, over which two or three frames are searched.
-const LAST: f64 = 60.0;
+const LAST: f64 = 3.0 * CONFIRMING as f64;
 /// The least gain by a short search.
 const LEAST_GAIN: f64 = 0.01;
 /// The nodes that a move visits, about.

@@ -37,11 +37,7 @@ pub(crate) fn conclude(
     let processors = store.join(resolved.run_count())?;
     let are_unlike = processors.len() > 1;
     let provenance = Provenance::gather(processors);
-    // Reports read references, so these are updated first.
-    reference::update(resolved, out, &provenance.revision, &store)?;
-    let experiment = &resolved.experiment;
-    let text =
-        report::write(&experiment.reports, experiment.suite.is_some(), &store, experiment.quick);
+    let text = report(resolved, out, &provenance, &store);
     // A mistake in a report must not cost the runs: `--redraw` makes the reports again.
     if matches!(text, Ok(_) | Err(Error::Query { .. })) {
         store.write_toml("resolved.toml", resolved)?;
@@ -55,6 +51,20 @@ pub(crate) fn conclude(
         summary.remarks.push(format!("the seconds come from unlike processors: {cpu}"));
     }
     Ok(())
+}
+
+/// Improves the best known costs and makes the reports of joined rows. Returns the text for the
+/// terminal.
+fn report(
+    resolved: &Resolved,
+    out: &Path,
+    provenance: &Provenance,
+    store: &Store,
+) -> Result<String, Error> {
+    // Reports read references, so these are updated first.
+    reference::update(resolved, out, &provenance.revision, store)?;
+    let experiment = &resolved.experiment;
+    report::write(&experiment.reports, experiment.suite.is_some(), store, experiment.quick)
 }
 
 /// Reads the spec of a finished experiment from its folder, and makes its reports again. Writes
@@ -104,9 +114,7 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     }
     // The rows are still the output of the program that ran, so its provenance is kept.
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
-    reference::update(&resolved, out, &provenance.revision, &store)?;
-    let text =
-        report::write(&experiment.reports, experiment.suite.is_some(), &store, experiment.quick)?;
+    let text = report(&resolved, out, &provenance, &store)?;
     store.write_toml("resolved.toml", &resolved)?;
     Ok(Summary { text, folder, ..Summary::default() })
 }
