@@ -1,5 +1,6 @@
 //! Axis-aligned boxes. Every builder, search and cost sees an object only as its box.
 
+use crate::each::Each;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
@@ -185,7 +186,7 @@ pub fn check_boxes(boxes: &[Aabb]) -> Result<(), InvalidBox> {
 
 #[inline]
 pub(crate) fn round_down(point: DVec3) -> Vec3 {
-    Vec3::from(point.to_array().map(|x| {
+    Vec3::from(point.to_array().each(|x| {
         let nearest = x as f32;
         if f64::from(nearest) > x { nearest.next_down() } else { nearest }
     }))

@@ -19,6 +19,7 @@
 //! region is.
 
 use crate::aabb::{round_down, round_up};
+use crate::each::Each;
 use crate::{Aabb, Corners, Frame, InFrame, Primitives, Sphere, Triangle};
 use core::fmt::Debug;
 use glam::DVec3;
@@ -106,7 +107,8 @@ impl<T: Corners> Clip for InFrame<'_, T> {
         let low = region.min.as_dvec3() - error;
         let high = region.max.as_dvec3() + error;
         let corners = triangle.corners();
-        let corners = self.frame.map_or(corners, |frame| corners.map(|corner| frame.point(corner)));
+        let corners =
+            self.frame.map_or(corners, |frame| corners.each(|corner| frame.point(corner)));
         let mut kept = Polygon::from_slice(&corners);
         for axis in 0..3 {
             // Planes that miss the triangle cut nothing off.

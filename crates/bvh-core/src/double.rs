@@ -5,6 +5,7 @@
 //! between 2⁻¹⁵⁰ and 2¹²⁰ in size; smaller ones count as 0. All values of the exact layer are then
 //! multiples of 2⁻⁶⁶⁰ below 2⁵⁰⁰.
 
+use crate::each::Each;
 use crate::exact::{Line, Verdict, is_degenerate};
 use crate::ray::power_below;
 use crate::triangle::{normal_of, offset_from};
@@ -21,7 +22,7 @@ impl From<[[f64; 3]; 3]> for DTriangle {
     /// Makes a triangle from three corners. Coordinates below 2⁻¹⁵⁰ count as 0, as those of a
     /// [ray](DRay::new): they are what rounding leaves of 0. Equal corners remain equal.
     fn from(corners: [[f64; 3]; 3]) -> Self {
-        Self(corners.map(|corner| DRay::exact(corner.into())))
+        Self(corners.each(|corner| DRay::exact(corner.into())))
     }
 }
 
@@ -114,7 +115,7 @@ impl DRay {
         t_min: f64,
         t_max: f64,
     ) -> Result<[DVec3; 2], OutOfExactRange> {
-        let [origin, direction] = [origin, direction].map(Self::exact);
+        let [origin, direction] = [origin, direction].each(Self::exact);
         if !is_exact(origin) {
             return Err(OutOfExactRange::Origin(origin));
         }

@@ -66,6 +66,7 @@
 //! by less than 2⁻⁴⁸ (M + S) with the largest M, by which their origins are moved as above.
 
 use crate::aabb::{round_down, round_up};
+use crate::each::Each;
 use crate::{Aabb, Ray};
 use glam::{DMat3, DVec3, Vec3};
 
@@ -148,12 +149,12 @@ impl Frame {
     /// Returns the rotation, row by row, and the centre.
     pub(crate) fn to_bytes(self) -> Vec<u8> {
         let [x, y, z] = self.axes;
-        let rows = [x, y, z, self.centre].map(|row| row.to_array());
+        let rows = [x, y, z, self.centre].each(|row| row.to_array());
         bytemuck::bytes_of(&rows).to_vec()
     }
 
     pub(crate) fn of_bytes(bytes: &[u8; Self::BYTES]) -> Result<Self, InvalidFrame> {
-        let [x, y, z, centre] = bytemuck::cast::<_, [[f64; 3]; 4]>(*bytes).map(DVec3::from);
+        let [x, y, z, centre] = bytemuck::cast::<_, [[f64; 3]; 4]>(*bytes).each(DVec3::from);
         Self::new(DMat3::from_cols(x, y, z).transpose(), centre)
     }
 
@@ -166,14 +167,14 @@ impl Frame {
     /// Returns the components of a direction in the frame, rounded.
     #[inline]
     pub fn direction(&self, direction: DVec3) -> DVec3 {
-        DVec3::from(self.axes.map(|axis| axis.dot(direction)))
+        DVec3::from(self.axes.each(|axis| axis.dot(direction)))
     }
 
     /// Returns the sums of |Rᵢⱼ| |pⱼ − cⱼ|, to which errors are relative.
     #[inline]
     fn sums(&self, point: DVec3) -> DVec3 {
         let size = (point - self.centre).abs();
-        DVec3::from(self.axes.map(|axis| axis.abs().dot(size)))
+        DVec3::from(self.axes.each(|axis| axis.abs().dot(size)))
     }
 
     /// Returns the smallest box in the frame that certainly contains a triangle of these corners: it is
@@ -202,7 +203,7 @@ impl Frame {
     /// Returns the ray for boxes in the frame that it begins near to.
     #[inline(always)]
     pub(crate) fn ray(&self, ray: &Ray) -> Ray {
-        let ends = ray.ends().map(Vec3::as_dvec3);
+        let ends = ray.ends().each(Vec3::as_dvec3);
         self.ray_of(ends, [ray.t_min(), ray.t_max()])
     }
 

@@ -8,6 +8,7 @@ mod collapse;
 pub mod cost;
 mod dispatch;
 mod double;
+mod each;
 mod exact;
 pub mod export;
 pub mod file;

@@ -1,6 +1,7 @@
 //! The conservative ray–box test: it never misses a box that contains a hit.
 
 use crate::aabb::{round_down, round_up};
+use crate::each::Each;
 use crate::ray::pow2;
 use crate::{Aabb, Frame, Ray, frame};
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
@@ -87,7 +88,7 @@ impl Slabs {
         match frame {
             None => Self::new(ray, bounds),
             Some(frame) => {
-                let ends = ray.ends().map(Vec3::as_dvec3);
+                let ends = ray.ends().each(Vec3::as_dvec3);
                 Self::of_frame(&frame.ray(ray), ends, frame, bounds)
             }
         }
@@ -282,8 +283,8 @@ impl FarRay {
     #[inline(never)]
     fn crossing(&self, axis: usize, position: f32) -> (f32, f32) {
         let direction = self.direction[axis];
-        let [lower, upper] =
-            [self.lower, self.upper].map(|origin| (f64::from(position) - origin[axis]) / direction);
+        let [lower, upper] = [self.lower, self.upper]
+            .each(|origin| (f64::from(position) - origin[axis]) / direction);
         // 0 / 0 where the ray runs in the plane.
         if lower.is_nan() || upper.is_nan() {
             return (f32::NEG_INFINITY, f32::INFINITY);

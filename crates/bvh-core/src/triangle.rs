@@ -1,5 +1,6 @@
 //! Triangles, and a watertight ray test: no ray passes through the edge between two triangles.
 
+use crate::each::Each;
 use crate::exact::{Line, is_degenerate};
 use crate::{Aabb, Frame, Ray};
 use bytemuck::{Pod, Zeroable};
@@ -12,7 +13,7 @@ pub struct Triangle(pub [Vec3; 3]);
 
 impl From<[[f32; 3]; 3]> for Triangle {
     fn from(corners: [[f32; 3]; 3]) -> Self {
-        Self(corners.map(Vec3::from))
+        Self(corners.each(Vec3::from))
     }
 }
 
@@ -39,7 +40,7 @@ impl Triangle {
     }
 
     pub(crate) fn area(&self) -> f64 {
-        let [a, b, c] = self.0.map(|corner| corner.as_dvec3());
+        let [a, b, c] = self.0.each(|corner| corner.as_dvec3());
         0.5 * (b - a).cross(c - a).length()
     }
 
@@ -49,7 +50,7 @@ impl Triangle {
     /// Source: Ericson 2005, *Real-Time Collision Detection*, section 5.1.5.
     pub fn closest_point(&self, point: impl Into<Vec3>) -> DVec3 {
         let point = point.into().as_dvec3();
-        point + offset_from(point, self.0.map(Vec3::as_dvec3))
+        point + offset_from(point, self.0.each(Vec3::as_dvec3))
     }
 
     /// Returns the weights of the three corners at the point where the ray's line meets the
@@ -64,7 +65,7 @@ impl Triangle {
     #[must_use]
     pub fn transformed(&self, transform: &Affine3A) -> Self {
         let transform = transform.as_daffine3();
-        Self(self.0.map(|corner| transform.transform_point3(corner.as_dvec3()).as_vec3()))
+        Self(self.0.each(|corner| transform.transform_point3(corner.as_dvec3()).as_vec3()))
     }
 
     /// Returns the unit vector perpendicular to the triangle, on the side from which its corners
@@ -146,7 +147,7 @@ pub trait Corners: Copy + core::fmt::Debug + Sync {
 impl Corners for Triangle {
     #[inline]
     fn corners(&self) -> [DVec3; 3] {
-        self.0.map(Vec3::as_dvec3)
+        self.0.each(Vec3::as_dvec3)
     }
 
     #[inline]
@@ -183,7 +184,7 @@ pub(crate) fn normal_of([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
 /// point is in the box of the corners, so no box along the file's axes around the triangle is
 /// farther.
 pub(crate) fn offset_from(point: DVec3, corners: [DVec3; 3]) -> DVec3 {
-    let [a, b, c] = corners.map(|corner| corner - point);
+    let [a, b, c] = corners.each(|corner| corner - point);
     let normal = (b - a).cross(c - a);
     let is_inside = |from: DVec3, to: DVec3| normal.dot(from.cross(to)) > 0.0;
     if is_inside(a, b) && is_inside(b, c) && is_inside(c, a) {

@@ -85,6 +85,7 @@ mod number;
 mod twice;
 mod volumes;
 
+use crate::each::Each;
 use glam::DVec3;
 pub(crate) use number::{Number, Point};
 pub(crate) use twice::{Numbers, Twice, distance};
@@ -123,15 +124,15 @@ impl Line {
         let direction = direction.double();
         let axes = AXES[largest_axis(direction.into())];
         Self {
-            origin: axes.map(|axis| origin[axis]),
-            direction: axes.map(|axis| direction[axis]),
+            origin: axes.each(|axis| origin[axis]),
+            direction: axes.each(|axis| direction[axis]),
             axes,
         }
     }
 
     /// Returns the origin and the direction by axis.
     fn ends(&self) -> [[f64; 3]; 2] {
-        [self.origin, self.direction].map(|ordered| {
+        [self.origin, self.direction].each(|ordered| {
             let mut by_axis = [0.0; 3];
             self.axes.into_iter().zip(ordered).for_each(|(axis, x)| by_axis[axis] = x);
             by_axis
@@ -156,7 +157,7 @@ impl Line {
     fn edge<P: Point>(&self, from: P, to: P) -> [f64; 3] {
         let from = from.double();
         let to = to.double();
-        self.axes.map(|axis| to[axis] - from[axis])
+        self.axes.each(|axis| to[axis] - from[axis])
     }
 
     /// Returns the edge values `u`, `v`, `w`, multiplied by `d_z`, and the bound of their errors.
@@ -177,7 +178,7 @@ impl Line {
     pub(crate) fn barycentrics<P: Point>(&self, triangle: &[P; 3]) -> Option<[f64; 3]> {
         let (weights, _) = self.edges(&self.relative(triangle));
         let sum: f64 = weights.iter().sum();
-        (sum != 0.0).then(|| weights.map(|weight| weight / sum))
+        (sum != 0.0).then(|| weights.each(|weight| weight / sum))
     }
 
     /// Decides in f64 if the error bounds permit.
@@ -203,12 +204,12 @@ impl Line {
         let to_third = self.edge(*first, *third);
         let (normal, products) = normal(&to_second, &to_third);
         let along = dot(&self.direction, &normal);
-        let along_error = ERROR * dot(&self.direction.map(f64::abs), &products);
+        let along_error = ERROR * dot(&self.direction.each(f64::abs), &products);
         if along == 0.0 || along_error > along.abs() {
             return Verdict::Unsure;
         }
         let t = dot(corner, &normal) / along;
-        let error = ERROR * dot(&corner.map(f64::abs), &products) + t.abs() * along_error;
+        let error = ERROR * dot(&corner.each(f64::abs), &products) + t.abs() * along_error;
         let slack = 0.25 * error / along.abs();
         let low = t - slack;
         let high = t + slack;
@@ -239,7 +240,7 @@ impl Line {
         let [first, second, third] = *triangle;
         let (normal, products) = normal(&self.edge(first, second), &self.edge(first, third));
         let along = dot(&self.direction, &normal);
-        if ERROR * dot(&self.direction.map(f64::abs), &products) < along.abs() {
+        if ERROR * dot(&self.direction.each(f64::abs), &products) < along.abs() {
             return if along > 0.0 { 1 } else { -1 };
         }
         Volumes::new(self, triangle).map_or(0, |volumes| volumes.facing())
@@ -252,7 +253,7 @@ impl Line {
         [origin, direction]: [P; 2],
         triangle: &[P; 3],
     ) -> f64 {
-        let [a, b, c] = triangle.map(P::double);
+        let [a, b, c] = triangle.each(P::double);
         let corner = difference(a, origin.double());
         let sides = [difference(b, a), difference(c, a)];
         let [low, high] = distance(corner, direction.double(), sides[0], sides[1], None);
@@ -275,7 +276,7 @@ impl Line {
         // The edge values in f64 are multiplied by the depth.
         let above = if self.direction[2] < 0.0 { -1 } else { 1 };
         let mut sides =
-            edges.map(|edge| above * (i32::from(edge > error) - i32::from(edge < -error)));
+            edges.each(|edge| above * (i32::from(edge > error) - i32::from(edge < -error)));
         if sides.contains(&-1) && sides.contains(&1) {
             return None;
         }
@@ -352,7 +353,7 @@ pub(crate) fn is_degenerate<P: Point>(triangle: &[P; 3]) -> bool {
 /// of two differences, a product and their difference, is off by ε of the sum of the absolute
 /// products, which the bound 64ε covers.
 pub(crate) fn normal_sign<P: Point>(triangle: &[P; 3], axis: usize) -> i32 {
-    let [a, b, c] = triangle.map(P::double);
+    let [a, b, c] = triangle.each(P::double);
     let edge = |from: [f64; 3], to: [f64; 3]| [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
     let (normal, products) = normal(&edge(a, b), &edge(a, c));
     let error = ERROR * products[axis];
@@ -367,7 +368,7 @@ pub(crate) fn normal_sign<P: Point>(triangle: &[P; 3], axis: usize) -> i32 {
 #[inline(always)]
 fn normal([px, py, pz]: &[f64; 3], [qx, qy, qz]: &[f64; 3]) -> ([f64; 3], [f64; 3]) {
     let pairs = [[py * qz, pz * qy], [pz * qx, px * qz], [px * qy, py * qx]];
-    (pairs.map(|[a, b]| a - b), pairs.map(|[a, b]| a.abs() + b.abs()))
+    (pairs.each(|[a, b]| a - b), pairs.each(|[a, b]| a.abs() + b.abs()))
 }
 
 #[inline(always)]

@@ -1,5 +1,6 @@
 //! The numbers that rays and triangles may have: f32 and f64.
 
+use crate::each::Each;
 use glam::{DVec3, Vec3};
 
 /// A number of coordinates and distances.
@@ -31,7 +32,7 @@ macro_rules! number {
             }
 
             fn rounded_again(x: f64) -> Option<Self> {
-                let [below, rounded, above] = [x.next_down(), x, x.next_up()].map(|x| x as Self);
+                let [below, rounded, above] = [x.next_down(), x, x.next_up()].each(|x| x as Self);
                 (f64::from(rounded) == x || below == above).then_some(rounded)
             }
 
@@ -63,7 +64,7 @@ macro_rules! number {
 
             #[inline(always)]
             fn double(self) -> [f64; 3] {
-                self.to_array().map(f64::from)
+                self.to_array().each(f64::from)
             }
         }
     };

@@ -34,6 +34,7 @@
 //! The [signs](sign) of d · n and A · n follow from the same sums with d or A for P, whose small parts
 //! are smaller: they are off by less than 118ε²M or 118ε²N, and nothing underflows.
 
+use crate::each::Each;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// A number, or several side by side.
@@ -162,7 +163,7 @@ pub(super) fn sign(a: [Twice<f64>; 3], p: [Twice<f64>; 3], q: [Twice<f64>; 3]) -
     let (normal, sizes) = cross(p, q);
     let Twice(large, small) = dot_twice(normal, a);
     let value = large + small;
-    let slack = dot(a.map(|x| x.0.abs()), sizes) * (1.0 / (1_u128 << 99) as f64);
+    let slack = dot(a.each(|x| x.0.abs()), sizes) * (1.0 / (1_u128 << 99) as f64);
     i32::from(value > slack) - i32::from(value < -slack)
 }
 

@@ -4,6 +4,7 @@
 use super::expansion::Expansion;
 use super::twice::{self, Twice};
 use super::{Line, Number, Point};
+use crate::each::Each;
 
 /// An exact difference of two points.
 type Difference = [Twice<f64>; 3];
@@ -11,11 +12,11 @@ type Difference = [Twice<f64>; 3];
 type Vector = [Expansion<2>; 3];
 
 pub(super) fn difference(p: [f64; 3], q: [f64; 3]) -> Difference {
-    [0, 1, 2].map(|axis| Twice::difference(p[axis], q[axis]))
+    [0, 1, 2].each(|axis| Twice::difference(p[axis], q[axis]))
 }
 
 fn exact(difference: Difference) -> Vector {
-    difference.map(Expansion::of)
+    difference.each(Expansion::of)
 }
 
 /// Adds one component of the exact cross product. Returned products would be copied from function to
@@ -41,9 +42,9 @@ const EDGES: [[usize; 2]; 3] = [[2, 1], [0, 2], [1, 0]];
 impl Volumes {
     /// Prepares exact values; `None` if a coordinate is not finite.
     pub(super) fn new<P: Point>(line: &Line, triangle: &[P; 3]) -> Option<Self> {
-        let triangle = triangle.map(P::double);
+        let triangle = triangle.each(P::double);
         let [origin, direction] = line.ends();
-        let corners = triangle.map(|corner| difference(corner, origin));
+        let corners = triangle.each(|corner| difference(corner, origin));
         let points = [origin, direction].into_iter().chain(triangle);
         let is_finite = points.flatten().all(f64::is_finite);
         is_finite.then_some(Self { direction, triangle, corners })
@@ -51,7 +52,7 @@ impl Volumes {
 
     /// Returns the side of an edge on which the ray is: −1, 0 or 1.
     pub(super) fn side(&self, edge: usize) -> i32 {
-        let [first, second] = EDGES[edge].map(|corner| self.corners[corner]);
+        let [first, second] = EDGES[edge].each(|corner| self.corners[corner]);
         self.volume(first, second)
     }
 
@@ -63,7 +64,7 @@ impl Volumes {
 
     /// Returns the sign of d · (p × q).
     fn volume(&self, p: Difference, q: Difference) -> i32 {
-        match twice::sign(self.direction.map(Twice::of), p, q) {
+        match twice::sign(self.direction.each(Twice::of), p, q) {
             0 => self.along(&exact(p), &exact(q)).sign(),
             sign => sign,
         }
@@ -114,7 +115,7 @@ impl Volumes {
         if twice::sign(self.corners[0], p, q) * self.volume(p, q) < 0 {
             return None;
         }
-        let [corner, p, q] = [self.corners[0], p, q].map(exact);
+        let [corner, p, q] = [self.corners[0], p, q].each(exact);
         let mut height = Expansion::zero();
         for (axis, component) in corner.iter().enumerate() {
             let mut normal = Expansion::zero();
@@ -129,7 +130,7 @@ impl Volumes {
 #[cold]
 #[inline(never)]
 pub(super) fn normal_sign<P: Point>(triangle: &[P; 3], axis: usize) -> i32 {
-    let [a, b, c] = triangle.map(P::double);
+    let [a, b, c] = triangle.each(P::double);
     let mut normal = Expansion::zero();
     add_cross(&mut normal, &exact(difference(b, a)), &exact(difference(c, a)), axis);
     normal.sign()
@@ -149,7 +150,7 @@ fn round_quotient<N: Number>(numerator: &Expansion<192>, denominator: &Expansion
     // least number.
     let exponent = |x: f64| libm::ilogb(x);
     let shift = exponent(numerator.approximate()) - exponent(denominator.approximate());
-    let [up, down] = [shift, -shift].map(|shift| libm::scalbn(1.0, shift.max(0)));
+    let [up, down] = [shift, -shift].each(|shift| libm::scalbn(1.0, shift.max(0)));
     let denominator = denominator.scaled(up);
     let numerator = numerator.scaled(down);
     // The exact difference of the numerator and a multiple of the denominator.

@@ -2,6 +2,7 @@
 //! counts into tables.
 
 use super::{Cell, Corner};
+use crate::each::Each;
 use glam::{DVec3, Vec4};
 
 /// The number of cells of the grid along each axis.
@@ -37,7 +38,7 @@ struct Clipped {
 
 impl Crossings {
     pub fn new() -> Self {
-        let faces = [[(); 2]; 3].map(|ways| ways.map(|()| vec![0; POINTS * CELLS * CELLS]));
+        let faces = [[(); 2]; 3].each(|ways| ways.each(|()| vec![0; POINTS * CELLS * CELLS]));
         Self { segments: 0, starts: vec![0; CELLS * CELLS * CELLS], faces }
     }
 
@@ -60,7 +61,7 @@ impl Crossings {
         // Walks from cell to cell through the face that comes first. Each axis takes exactly the
         // steps between the two cells, so the walk reaches the last cell despite rounding.
         while cell != end {
-            let times = [0, 1, 2].map(|axis| time_of_next_face(axis, cell, end, from, ray));
+            let times = [0, 1, 2].each(|axis| time_of_next_face(axis, cell, end, from, ray));
             let earliest = (0..3).min_by(|&a, &b| times[a].total_cmp(&times[b]));
             let axis = earliest.unwrap_or(0);
             let downward = end[axis] < cell[axis];
@@ -76,8 +77,8 @@ impl Crossings {
 
     /// Returns the tables of signed counts, one per corner of a box; see [the measure](super).
     pub fn corner_tables(&self) -> Vec<Corner> {
-        let summed = |ways: &[Vec<u32>; 2]| ways.each_ref().map(|faces| summed_faces(faces));
-        let faces = self.faces.each_ref().map(summed);
+        let summed = |ways: &[Vec<u32>; 2]| ways.each_ref().each(|faces| summed_faces(faces));
+        let faces = self.faces.each_ref().each(summed);
         let sums = Sums { starts: summed_starts(&self.starts), faces };
         let mut tables = Vec::with_capacity(8 * CELLS * CELLS * CELLS);
         for cell in cells() {
@@ -135,8 +136,8 @@ fn clip_to_grid(from: DVec3, ray: DVec3) -> Option<Clipped> {
 /// Returns the cell of a point, or the nearest cell if rounding has moved the point out of the
 /// grid.
 fn cell_at(point: DVec3) -> [usize; 3] {
-    let cell = point.to_array().map(|x| x.clamp(0.0, END) as usize);
-    cell.map(|index| index.min(CELLS - 1))
+    let cell = point.to_array().each(|x| x.clamp(0.0, END) as usize);
+    cell.each(|index| index.min(CELLS - 1))
 }
 
 /// Returns when a segment leaves `cell` across an axis on its way to the cell `end`; infinity if it
@@ -170,7 +171,7 @@ impl Sums {
         let [x, y, z] = cell;
         let plane = |z: usize| {
             let points = [[x, y, z], [x + 1, y, z], [x, y + 1, z], [x + 1, y + 1, z]];
-            Vec4::from(points.map(|point| self.signed_count(corner, point)))
+            Vec4::from(points.each(|point| self.signed_count(corner, point)))
         };
         Corner([plane(z), plane(z + 1)])
     }
@@ -178,8 +179,8 @@ impl Sums {
     /// Returns the term of a box's corner in the number of entries if the corner is at a grid
     /// point.
     fn signed_count(&self, corner: usize, point: [usize; 3]) -> f32 {
-        let high = [0, 1, 2].map(|axis| corner >> axis & 1);
-        let sign = high.map(|high| if high == 1 { 1.0 } else { -1.0 });
+        let high = [0, 1, 2].each(|axis| corner >> axis & 1);
+        let sign = high.each(|high| if high == 1 { 1.0 } else { -1.0 });
         let starts = self.starts[(point[2] * POINTS + point[1]) * POINTS + point[0]];
         let mut sum = sign[0] * sign[1] * sign[2] * starts as f64;
         for axis in 0..3 {

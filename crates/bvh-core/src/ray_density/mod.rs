@@ -40,6 +40,7 @@ mod crossings;
 mod segment;
 
 use crate::cost::Measure;
+use crate::each::Each;
 use crate::{Aabb, Bvh, Node, PackedAabb, TestCounts};
 use crossings::{CELLS, Crossings, index};
 use glam::{DVec3, DVec4, Vec4};
@@ -112,8 +113,8 @@ impl Grid {
     /// Returns the ends of a segment in cells, [extended](LENGTHENED); `None` if the segment is not
     /// finite.
     fn in_cells(&self, segment: &Segment) -> Option<[DVec3; 2]> {
-        let start = DVec3::from(segment.from.map(f64::from));
-        let end = DVec3::from(segment.to.map(f64::from));
+        let start = DVec3::from(segment.from.each(f64::from));
+        let end = DVec3::from(segment.to.each(f64::from));
         if !start.is_finite() || !end.is_finite() {
             return None;
         }
@@ -251,7 +252,7 @@ impl RayDensity {
     /// Returns the corners in fractions of cells, rounded outward and clamped to the grid.
     #[inline(always)]
     fn round(&self, bounds: &PackedAabb) -> Rounded {
-        let [negated_min, max] = bounds.planes().map(|plane| Vec4::from(plane).as_dvec4());
+        let [negated_min, max] = bounds.planes().each(|plane| Vec4::from(plane).as_dvec4());
         let end = DVec4::splat(CELLS as f64 * FRACTIONS);
         let clamped = |point: DVec4| ((point - self.low) * self.scale).max(DVec4::ZERO).min(end);
         Rounded { low: clamped(-negated_min).floor(), high: clamped(max).ceil() }
@@ -262,19 +263,19 @@ impl RayDensity {
     fn across(&self, Rounded { low, high }: &Rounded) -> f64 {
         let cells = [cell_of(*low), cell_of(*high)];
         let places = [*low - cells[0] * FRACTIONS, *high - cells[1] * FRACTIONS];
-        let cells = cells.map(indices);
+        let cells = cells.each(indices);
         // The weights of the grid points around the low and around the high corner: along x and y,
         // of the four of a plane; along z, of the two planes.
-        let weights = |axis: usize| places.map(|place| [FRACTIONS - place[axis], place[axis]]);
-        let along_x = weights(0).map(|[a, b]| DVec4::new(a, b, a, b));
-        let along_y = weights(1).map(|[a, b]| DVec4::new(a, a, b, b));
+        let weights = |axis: usize| places.each(|place| [FRACTIONS - place[axis], place[axis]]);
+        let along_x = weights(0).each(|[a, b]| DVec4::new(a, b, a, b));
+        let along_y = weights(1).each(|[a, b]| DVec4::new(a, a, b, b));
         let along_z = weights(2);
         let mut sum = DVec4::ZERO;
         for corner in 0..8 {
-            let [i, j, k] = [0, 1, 2].map(|axis| corner >> axis & 1);
+            let [i, j, k] = [0, 1, 2].each(|axis| corner >> axis & 1);
             let cell = [cells[i][0], cells[j][1], cells[k][2]];
             let [lower, upper] =
-                self.corners[8 * index(cell) + corner].0.map(|four| four.as_dvec4());
+                self.corners[8 * index(cell) + corner].0.each(|four| four.as_dvec4());
             let [below, above] = along_z[k];
             sum += (lower * below + upper * above) * (along_x[i] * along_y[j]);
         }
@@ -317,7 +318,7 @@ fn cell_of(corner: DVec4) -> DVec4 {
 
 #[inline(always)]
 fn indices(cell: DVec4) -> [usize; 3] {
-    [cell.x, cell.y, cell.z].map(|index| index as u32 as usize)
+    [cell.x, cell.y, cell.z].each(|index| index as u32 as usize)
 }
 
 /// Returns the fractional entries of a box within one cell. They are the sum of two parts: the flux
@@ -329,7 +330,7 @@ fn within(table: &Cell, rounded: &Rounded, cell: DVec4) -> f64 {
     let high = rounded.high - cell * FRACTIONS;
     let size = high - low;
     let others = DVec4::new(size.y * size.z, size.z * size.x, size.x * size.y, 0.0);
-    let [constant, by_low, by_high, by_size] = table.0.map(|row| row.as_dvec4());
+    let [constant, by_low, by_high, by_size] = table.0.each(|row| row.as_dvec4());
     let flux = constant + by_low * low + by_high * high + by_size * size;
     (flux * others).element_sum()
 }

@@ -70,6 +70,7 @@ use super::obstacles::{Beams, Obstacles};
 use super::ray_lanes::least as least_of;
 use super::triangles::TriangleBlock;
 use crate::Aabb;
+use crate::each::Each;
 use crate::exact::{AXES, largest_axis};
 use crate::ray::{pow2, power_below};
 use core::mem::MaybeUninit;
@@ -149,7 +150,7 @@ impl<K: Instructions> Group<K> {
                     group.places[vector][axis] = place;
                     place.store(places.0[vector][axis].as_mut_ptr());
                 }
-                let place = |lane: usize| Vec3::from(places.0[vector].map(|axis| axis[lane]));
+                let place = |lane: usize| Vec3::from(places.0[vector].each(|axis| axis[lane]));
                 group.bounds[vector] = Aabb::around((0..K::Rays::N).map(place));
             }
             for lane in 0..K::Rays::N {
@@ -223,7 +224,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
         let [x, y, z] = axes;
         let depth = direction[z];
         let slope = [-direction[x] / depth, -direction[y] / depth];
-        let slopes = slope.map(|slope| slope as f32);
+        let slopes = slope.each(|slope| slope as f32);
         let size = depth.abs() * group.scale;
         let half = group.half;
         self.direction = direction;
@@ -235,7 +236,7 @@ impl<'a, K: Instructions, O: Obstacles> Beam<'a, K, O> {
             half[z],
         ];
         self.side = if depth < 0.0 { -0.0 } else { 0.0 };
-        self.range = beams.range.map(|t| {
+        self.range = beams.range.each(|t| {
             let end = (t * size).min(16.0);
             let slack = end * f64::from(pow2(-21)) + f64::from(f32::from_bits(1)) * size;
             [(end - slack) as f32, (end + slack) as f32]
@@ -589,7 +590,7 @@ impl<L: Lanes> Outlook<L> {
         // SAFETY: the processor has the instructions.
         unsafe {
             let splat = |v: Vec3| [L::splat(v.x), L::splat(v.y), L::splat(v.z)];
-            let is_backwards = [sign.x < 0.0, sign.y < 0.0, sign.z < 0.0].map(usize::from);
+            let is_backwards = [sign.x < 0.0, sign.y < 0.0, sign.z < 0.0].each(usize::from);
             let [x, y, z] = is_backwards;
             Self {
                 near: [3 * x, 1 + 3 * y, 2 + 3 * z],

@@ -15,6 +15,7 @@ use super::instructions::Instructions;
 use super::lanes::{DoubleLanes, Lanes};
 use super::layout::WideNode;
 use crate::Ray;
+use crate::each::Each;
 use crate::slabs::{FAR, FAR_DOUBLE, FarRay, NEAR, NEAR_DOUBLE};
 
 /// The bytes of a node's eight planes.
@@ -128,8 +129,8 @@ impl FarBoxRay {
         };
         Self {
             planes: Planes::of(boxed),
-            near_origin: [0, 1, 2].map(|axis| origin(axis, !is_backwards(axis))),
-            far_origin: [0, 1, 2].map(|axis| origin(axis, is_backwards(axis))),
+            near_origin: [0, 1, 2].each(|axis| origin(axis, !is_backwards(axis))),
+            far_origin: [0, 1, 2].each(|axis| origin(axis, is_backwards(axis))),
             // The signs of zeros decide the planes, here as there.
             inverse: far.direction.recip().to_array(),
             t_min: boxed.t_min(),

@@ -34,6 +34,7 @@ use super::triangles::TriangleBlock;
 use super::turn::Turn;
 use super::{build, portable, vector};
 use crate::double::{NearestHit, Query};
+use crate::each::Each;
 use crate::slabs::FarRay;
 use crate::{
     Aabb, Bvh, DHit, DRay, DTriangle, Frame, Hit, InFrame, InvalidBvh, Kernel, Orientation, Ray,
@@ -83,7 +84,7 @@ impl DWideBvh {
         validate_references(tree, &objects.boxes(), &objects)?;
         let in_frame = |corner: DVec3| frame.point(corner).as_vec3();
         let rounded: Vec<Triangle> =
-            triangles.iter().map(|triangle| Triangle(triangle.0.map(in_frame))).collect();
+            triangles.iter().map(|triangle| Triangle(triangle.0.each(in_frame))).collect();
         let framed = match tree.frame {
             Some(_) => Cow::Borrowed(tree),
             None => Cow::Owned(Bvh { frame: Some(frame), ..tree.clone() }),

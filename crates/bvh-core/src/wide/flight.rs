@@ -26,6 +26,7 @@ use super::prepared::{Prepared, Ready, Test};
 use super::ray_lanes::Rays;
 use super::triangles::TriangleBlock;
 use crate::Hit;
+use crate::each::Each;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
@@ -501,14 +502,14 @@ unsafe fn candidates<L: Lanes, F: Find>(
     // SAFETY: the processor has the instructions; the rays are at blocks; the bits of the nearest
     // hit are the first two of four aligned lanes.
     unsafe {
-        let tests = four.map(|at| Test { ray: &(*at).ray, block: (*at).block(wide) });
+        let tests = four.each(|at| Test { ray: &(*at).ray, block: (*at).block(wide) });
         let rays = Test::rays::<L>(tests);
         let candidates = rays.candidates(&Test::corners(tests));
         let crossings = candidates.crossings;
         if F::ALL {
             return (crossings, 0);
         }
-        let t_max = L::load_quarters(four.map(|at| (&raw const (*at).nearest).cast()));
+        let t_max = L::load_quarters(four.each(|at| (&raw const (*at).nearest).cast()));
         let (possible, sure) = rays.within(&candidates, t_max.spread::<1>());
         (Crossings { possible, ..crossings }, sure)
     }
@@ -520,16 +521,16 @@ unsafe fn bounds<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) -> [Bounde
     let mut bounded = [Bounded::zeroed(); 4];
     // SAFETY: as in `candidates`; there is room.
     unsafe {
-        let tests = four.map(|at| Test { ray: &(*at).ray, block: (*at).block(wide) });
+        let tests = four.each(|at| Test { ray: &(*at).ray, block: (*at).block(wide) });
         let rays = Test::rays::<L>(tests);
         let candidates = rays.candidates(&Test::corners(tests));
-        let t_max = L::load_quarters(four.map(|at| (&raw const (*at).nearest).cast()));
+        let t_max = L::load_quarters(four.each(|at| (&raw const (*at).nearest).cast()));
         let (possible, certain) = rays.within(&candidates, t_max.spread::<1>());
         let ([low, high], along) = rays.distances(&candidates);
         let to = bounded.as_mut_ptr();
         let to = [to, to.add(1), to.add(2), to.add(3)];
-        low.store_quarters(to.map(|to| (&raw mut (*to).low).cast()));
-        high.store_quarters(to.map(|to| (&raw mut (*to).high).cast()));
+        low.store_quarters(to.each(|to| (&raw mut (*to).low).cast()));
+        high.store_quarters(to.each(|to| (&raw mut (*to).high).cast()));
         for (k, to) in bounded.iter_mut().enumerate().take(L::N / 4) {
             let four = |pairs: u32| pairs >> (4 * k) & 0b1111;
             to.possible = four(possible);

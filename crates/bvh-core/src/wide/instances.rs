@@ -12,6 +12,7 @@
 //! differ if transforms do not round: translations by whole numbers and turns by right angles.
 
 use super::layout::WideBvh;
+use crate::each::Each;
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, any_hit_by, nearest_hit_by, validate};
 use glam::{Affine3A, DAffine3, DMat3, DVec3, Vec3Swizzles};
 use std::borrow::Borrow;
@@ -90,7 +91,7 @@ impl Instance {
 
 /// Returns whether the determinant is zero, or is smaller than its rounding.
 fn is_singular(matrix: &DMat3) -> bool {
-    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec3::abs);
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].each(DVec3::abs);
     // The sum of the sizes of its six products.
     let size = x.dot(y.yzx() * z.zxy() + y.zxy() * z.yzx());
     matrix.determinant().abs() <= size * (4.0 * f64::EPSILON)

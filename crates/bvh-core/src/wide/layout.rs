@@ -4,6 +4,7 @@ use super::kernel::Kernel;
 use super::lanes::Lanes;
 use super::triangles::TriangleBlock;
 use super::turn::Turn;
+use crate::each::Each;
 use crate::slabs::{FarRay, near_region};
 use crate::{Aabb, Frame, Ray, Slabs};
 use bytemuck::{Pod, Zeroable};
@@ -37,7 +38,8 @@ impl WideNode {
 
     /// The box of a lane's child; `None` for an unused lane.
     pub(crate) fn lane_box(&self, lane: usize) -> Option<Aabb> {
-        let corner = |from: usize| [from, from + 1, from + 2].map(|plane| self.planes[plane][lane]);
+        let corner =
+            |from: usize| [from, from + 1, from + 2].each(|plane| self.planes[plane][lane]);
         (self.planes[0][lane] < f32::INFINITY).then(|| Aabb::from([corner(0), corner(3)]))
     }
 }
@@ -179,7 +181,7 @@ impl WideBvh {
         match &self.framed {
             None => (*ray, ray.begins_in(&self.near)),
             Some(framed) => {
-                let [origin, direction] = ray.ends().map(Vec3::as_dvec3);
+                let [origin, direction] = ray.ends().each(Vec3::as_dvec3);
                 let range = [ray.t_min(), ray.t_max()];
                 // SAFETY: the caller's.
                 let ray = unsafe { framed.turn.ray::<L>(origin, direction, [1.0; 2], range) };
@@ -193,7 +195,7 @@ impl WideBvh {
         match &self.framed {
             None => FarRay::new(ray),
             Some(framed) => {
-                let ends = ray.ends().map(Vec3::as_dvec3);
+                let ends = ray.ends().each(Vec3::as_dvec3);
                 FarRay::in_frame(ends, &framed.frame, &framed.bounds)
             }
         }

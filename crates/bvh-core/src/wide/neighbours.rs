@@ -1,6 +1,7 @@
 //! Points in an order in which neighbours follow each other.
 
 use super::POINTS_OF_BEAM;
+use crate::each::Each;
 use crate::exact::largest_axis;
 use glam::DVec3;
 
@@ -13,7 +14,7 @@ pub fn neighbours<P: Copy + Into<DVec3>>(points: &[P]) -> Vec<u32> {
     let at = |point: &P| (*point).into();
     let low = points.iter().map(at).fold(DVec3::INFINITY, DVec3::min);
     // The bits of numbers from +0 on are in the order of the numbers.
-    let bits = |point: &P| (at(point) - low + DVec3::ZERO).as_vec3().to_array().map(f32::to_bits);
+    let bits = |point: &P| (at(point) - low + DVec3::ZERO).as_vec3().to_array().each(f32::to_bits);
     let mut points: Vec<([u32; 3], u32)> = points.iter().map(bits).zip(0..).collect();
     // Pairs of a beginning and an end.
     let mut open = vec![(0, points.len())];
@@ -31,8 +32,8 @@ pub fn neighbours<P: Copy + Into<DVec3>>(points: &[P]) -> Vec<u32> {
                 most[axis] = most[axis].max(place[axis]);
             }
         }
-        let size = [0, 1, 2].map(|k| f32::from_bits(most[k]) - f32::from_bits(least[k]));
-        let axis = largest_axis(size.map(f64::from).into());
+        let size = [0, 1, 2].each(|k| f32::from_bits(most[k]) - f32::from_bits(least[k]));
+        let axis = largest_axis(size.each(f64::from).into());
         // Beams begin at multiples of their size, and end between halves.
         let unit = if count > POINTS_OF_BEAM { POINTS_OF_BEAM } else { FEW };
         let middle = (count / 2).div_ceil(unit) * unit;

@@ -5,6 +5,7 @@ use super::double_block::corners_of;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::triangles::TriangleBlock;
+use crate::each::Each;
 use crate::{Coherence, DRay, PreparedRay, Ray, Select};
 use glam::{DVec3, Vec3};
 
@@ -77,7 +78,7 @@ impl Obstacles for WideBvh {
     }
 
     fn reach(&self, point: DVec3) -> f64 {
-        let [min, max] = [self.bounds.min, self.bounds.max].map(Vec3::as_dvec3);
+        let [min, max] = [self.bounds.min, self.bounds.max].each(Vec3::as_dvec3);
         (max - point).max(point - min).max_element()
     }
 
@@ -96,7 +97,7 @@ impl Obstacles for WideBvh {
         axes: [usize; 3],
     ) -> [[L::Double; 3]; 3] {
         // SAFETY: the processor has the instructions; these are rows.
-        let [a, b, c] = unsafe { block.corners_along::<L>(axes.map(|axis| axis * L::N)) };
+        let [a, b, c] = unsafe { block.corners_along::<L>(axes.each(|axis| axis * L::N)) };
         [double(a), double(b), double(c)]
     }
 
@@ -151,7 +152,7 @@ impl Obstacles for DWideBvh {
     ) -> [[L::Double; 3]; 3] {
         // SAFETY: the processor has the instructions.
         let corners = unsafe { corners_of::<L>(block, &self.triangles, block.used::<L>()) };
-        corners.map(|corner| axes.map(|axis| corner[axis]))
+        corners.each(|corner| axes.each(|axis| corner[axis]))
     }
 
     fn stops(&self, ray: &DRay, block: &TriangleBlock, lane: usize) -> bool {

@@ -7,6 +7,7 @@ use super::lanes::{Aligned, Lanes, Mask};
 use super::layout::{Child, WideBvh};
 use super::pairs::{Crossings, Pairs};
 use super::triangles::TriangleBlock;
+use crate::each::Each;
 use crate::exact::{AXES, largest_axis};
 use crate::slabs::FarRay;
 use crate::{Hit, Ray};
@@ -337,7 +338,7 @@ impl<L: Lanes> LeafRay<L> {
                 L::splat(reach),
                 L::splat(ray.t_min()),
             );
-            Self { pairs, rows: axes.map(|axis| axis * TriangleBlock::LANES) }
+            Self { pairs, rows: axes.each(|axis| axis * TriangleBlock::LANES) }
         }
     }
 

@@ -15,6 +15,7 @@ use super::packet_vector::{Nearest, Vector};
 use super::pinhole::{Seen, one_origin};
 use super::ray_lanes::{BoxLanes, RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
+use crate::each::Each;
 use crate::slabs::{FAR, NEAR};
 use core::mem::MaybeUninit;
 use glam::Vec3;
@@ -265,7 +266,11 @@ impl<K: Instructions> Packet<K> {
         unsafe {
             loop {
                 let block = &*wide.blocks.as_ptr().add(index);
-                let seen = self.origin.map(|origin| Seen::new::<K::Block>(block, origin));
+                let mut seen = None;
+                // A closure would be compiled without the instructions wherever it is not inlined.
+                if let Some(origin) = self.origin {
+                    seen = Some(Seen::new::<K::Block>(block, origin));
+                }
                 for i in first..self.count {
                     let entered = if i > first { self.enter(i, planes) } else { entered };
                     if entered != 0 {
@@ -475,7 +480,7 @@ impl<K: Instructions, F: Find> Task<K> for Decide<'_, K::Rays, F> {
                 nearest.end(this, hit.object);
             } else {
                 let known = find.known(number);
-                let bounds = [known.low, known.high].map(|t| nearest.t.filled(t));
+                let bounds = [known.low, known.high].each(|t| nearest.t.filled(t));
                 nearest.take(this, bounds, known.object);
             }
         }
@@ -573,7 +578,7 @@ impl<L: Lanes> Culling<L> {
     /// Returns the planes of a box that contains everything, by axis.
     #[inline(always)]
     pub(super) fn all_space(&self) -> [[f32; 2]; 3] {
-        let far = self.side.map(|side| f32::INFINITY.copysign(side));
+        let far = self.side.each(|side| f32::INFINITY.copysign(side));
         [[-far[0], far[0]], [-far[1], far[1]], [-far[2], far[2]]]
     }
 

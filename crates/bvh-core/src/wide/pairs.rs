@@ -77,6 +77,7 @@
 //! interval round to one f32, that f32 is the rounded distance, because rounding is monotone.
 
 use super::lanes::{Aligned, DoubleLanes, Lanes, Mask};
+use crate::each::Each;
 use crate::exact::ERROR;
 use crate::ray::pow2;
 use crate::{PreparedRay, Ray, Triangle};
@@ -389,16 +390,16 @@ impl<L: Lanes> Pairs<L> {
             unsafe { lanes.store(numbers.as_mut_ptr()) };
             numbers
         };
-        let origin = self.origin.map(stored);
-        let direction = self.direction.map(stored);
-        let corners = corners.map(|corner| corner.map(stored));
+        let origin = self.origin.each(stored);
+        let direction = self.direction.each(stored);
+        let corners = corners.each(|corner| corner.each(stored));
         let mut distances = Aligned(stored(t));
         let mut hits = is_hit.bits();
         for lane in (0..L::N).filter(|lane| unsure >> lane & 1 != 0) {
             // The distance does not depend on the names of the axes.
-            let of = |numbers: &[[f32; 16]; 3]| numbers.map(|numbers| numbers[lane]);
+            let of = |numbers: &[[f32; 16]; 3]| numbers.each(|numbers| numbers[lane]);
             let ray = Ray::assume_valid(of(&origin), of(&direction), 0.0, f32::MAX);
-            let triangle = Triangle::from(corners.each_ref().map(of));
+            let triangle = Triangle::from(corners.each_ref().each(of));
             // The bounds for one ray and one triangle are narrower.
             if let Some(t) = triangle.intersect(&PreparedRay::new(&ray), f32::MAX) {
                 hits |= 1 << lane;
@@ -447,7 +448,7 @@ pub(super) fn meet<L: Lanes>(
     direction: [L; 3],
     (height, slack): (L::Double, L::Double),
 ) -> (L::Mask, L::Mask, L) {
-    let [dx, dy, dz] = direction.map(L::double);
+    let [dx, dy, dz] = direction.each(L::double);
     let speed = nz.mul_add(dz, ny.mul_add(dy, *nx * dx));
     let inverse = speed.inverse();
     let t = height * inverse;

@@ -27,6 +27,7 @@ use super::pairs::{Crossings, Plane, meet};
 use super::ray_lanes::RayBounds;
 use super::triangles::TriangleBlock;
 use crate::Aabb;
+use crate::each::Each;
 use crate::ray::pow2;
 use core::mem::MaybeUninit;
 use glam::Vec3;
@@ -45,7 +46,7 @@ pub(super) fn one_origin<L: Lanes>(rays: &RayBounds<L>, bounds: &Aabb) -> Option
             return None;
         }
         origin[axis] = low;
-        let [first, last] = rays.inverses(axis).map(f32::abs);
+        let [first, last] = rays.inverses(axis).each(f32::abs);
         least = least.min(first.min(last));
         most = most.min(first.max(last));
     }

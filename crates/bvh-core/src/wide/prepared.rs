@@ -8,6 +8,7 @@ use super::pairs::Pairs;
 use super::ray_lanes::{BoxLanes, Loaded, RayLanes};
 use super::triangles::{TriangleBlock, three_by_three};
 use crate::Aabb;
+use crate::each::Each;
 use crate::exact::AXES;
 use crate::slabs::{FAR, NEAR};
 
@@ -187,7 +188,7 @@ impl Test<'_> {
     pub(crate) unsafe fn rays<L: Lanes>(four: [Self; 4]) -> Pairs<L> {
         // SAFETY: there are so many rows of four aligned lanes.
         unsafe {
-            let row = |row: usize| L::load_quarters(four.map(|test| test.ray.row(row)));
+            let row = |row: usize| L::load_quarters(four.each(|test| test.ray.row(row)));
             let origin = row(3);
             let last = row(4);
             let errors = row(7);
@@ -211,7 +212,7 @@ impl Test<'_> {
                 block.corners.as_ptr().cast::<f32>().wrapping_add(row * TriangleBlock::LANES)
             };
             // SAFETY: there are three axes of four aligned lanes for every corner.
-            unsafe { L::load_quarters(four.map(lanes)) }
+            unsafe { L::load_quarters(four.each(lanes)) }
         })
     }
 }

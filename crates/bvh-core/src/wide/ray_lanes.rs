@@ -4,6 +4,7 @@ use super::instructions::Instructions;
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::layout::WideBvh;
 use super::pairs::Pairs;
+use crate::each::Each;
 use crate::exact::AXES;
 use crate::{Aabb, Frame, Ray};
 
@@ -240,7 +241,7 @@ unsafe fn transpose<L: Lanes>(rays: *const Ray, vector: usize) -> [L; 4] {
     unsafe {
         let row = |i: usize| {
             let ray = rays.cast::<f32>().wrapping_add(4 * vector + i * STEP);
-            L::load_quarters([0, 4, 8, 12].map(|other| ray.wrapping_add(other * STEP)))
+            L::load_quarters([0, 4, 8, 12].each(|other| ray.wrapping_add(other * STEP)))
         };
         L::transpose_quarters([row(0), row(1), row(2), row(3)])
     }

@@ -1,6 +1,7 @@
 //! Triangles side by side, for tests of one ray against all of them.
 
 use super::lanes::Lanes;
+use crate::each::Each;
 use crate::{MAX_OBJECTS, Triangle};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -126,9 +127,10 @@ impl TriangleBlock {
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> Option<(u32, Triangle)> {
         let id = self.id(lane);
-        let corner =
-            |corner: &[[f32; Self::LANES]; 3]| Vec3::from(corner.each_ref().map(|axis| axis[lane]));
-        (id != Self::UNUSED).then(|| (id, Triangle(self.corners.each_ref().map(corner))))
+        let corner = |corner: &[[f32; Self::LANES]; 3]| {
+            Vec3::from(corner.each_ref().each(|axis| axis[lane]))
+        };
+        (id != Self::UNUSED).then(|| (id, Triangle(self.corners.each_ref().each(corner))))
     }
 }
 

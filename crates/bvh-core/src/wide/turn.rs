@@ -1,6 +1,7 @@
 //! Single rays in a frame, by vector registers.
 
 use super::lanes::{DoubleLanes, Lanes};
+use crate::each::Each;
 use crate::{Frame, Ray};
 use glam::{DVec3, Vec4};
 
@@ -15,7 +16,7 @@ pub(crate) struct Turn {
 impl Turn {
     pub(crate) fn new(frame: &Frame) -> Self {
         let [x, y, z] = frame.axes;
-        let columns = [0, 1, 2].map(|axis| [x[axis], y[axis], z[axis], 0.0]);
+        let columns = [0, 1, 2].each(|axis| [x[axis], y[axis], z[axis], 0.0]);
         Self { columns, centre: frame.centre }
     }
 
@@ -37,14 +38,14 @@ impl Turn {
         // SAFETY: the processor has the instructions; a vector has four numbers.
         unsafe {
             let [to_origin, to_direction, to_inverse] =
-                vectors.each_mut().map(|vector| (&raw mut *vector).cast());
+                vectors.each_mut().each(|vector| (&raw mut *vector).cast());
             L::single(self.turned::<L>(origin - self.centre)).store(to_origin);
             // The unit is found meanwhile.
             let along = self.turned::<L>(direction);
             L::single(along * along.filled(unit)).store(to_direction);
             L::single(along.filled(Frame::ABOVE * size) / along).store(to_inverse);
         }
-        let [origin, direction, inverse] = vectors.map(Vec4::truncate);
+        let [origin, direction, inverse] = vectors.each(Vec4::truncate);
         Ray::with_inverse(origin, direction, inverse, t_min, t_max)
     }
 
@@ -56,7 +57,7 @@ impl Turn {
     unsafe fn turned<L: Lanes>(&self, direction: DVec3) -> L::Double {
         // SAFETY: the processor has the instructions; a column has four numbers.
         unsafe {
-            let [x, y, z] = direction.to_array().map(|x| L::Double::splat(x));
+            let [x, y, z] = direction.to_array().each(|x| L::Double::splat(x));
             let [first, second, third] = &self.columns;
             let first = L::Double::load(first.as_ptr());
             let second = L::Double::load(second.as_ptr());

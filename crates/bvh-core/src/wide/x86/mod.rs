@@ -47,21 +47,42 @@ where
     }
 }
 
-/// The functions that both instruction sets have in common. `$features` are those of the set.
-/// `$compress` moves the lanes of a mask to the front. If all others are 0, zeros follow.
+/// The function that a task is called in. It is the task's own and not the instruction set's, so that
+/// the compiler builds tasks of different files side by side, and not all of a set in one piece.
+trait Entry<K: Instructions>: Task<K> {
+    unsafe fn enter(self) -> Self::Output;
+}
+
+macro_rules! entry {
+    ($set:ident, $features:tt) => {
+        impl<T: Task<$set>> Entry<$set> for T {
+            #[target_feature(enable = $features)]
+            #[inline(never)]
+            unsafe fn enter(self) -> T::Output {
+                // SAFETY: the processor has the instructions, with which this function is compiled.
+                unsafe { self.run() }
+            }
+        }
+    };
+}
+
+entry!(Avx2, "avx2,fma,bmi1,bmi2,popcnt,lzcnt");
+entry!(Avx512, "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt");
+
+/// The functions that both instruction sets have in common. `$compress` moves the lanes of a mask to
+/// the front. If all others are 0, zeros follow.
 macro_rules! shared {
-    ($features:tt, $compress:ident) => {
+    ($compress:ident) => {
         #[inline(always)]
         unsafe fn prefetch(line: *const u8) {
             // SAFETY: a prefetch may name any address.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
         }
 
-        #[target_feature(enable = $features)]
-        #[inline(never)]
+        #[inline(always)]
         unsafe fn call<T: Task<Self>>(task: T) -> T::Output {
-            // SAFETY: the processor has the instructions, with which this function is compiled.
-            unsafe { task.run() }
+            // SAFETY: the processor has the instructions.
+            unsafe { Entry::<Self>::enter(task) }
         }
 
         #[inline(always)]
@@ -103,7 +124,7 @@ impl Instructions for Avx2 {
     type Block = F32x4;
     type Rays = F32x8;
 
-    shared!("avx2,fma,bmi1,bmi2,popcnt,lzcnt", permuted);
+    shared!(permuted);
 
     #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
@@ -159,7 +180,7 @@ impl Instructions for Avx512 {
     type Block = F32x4;
     type Rays = F32x16;
 
-    shared!("avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt", compressed);
+    shared!(compressed);
 
     #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
