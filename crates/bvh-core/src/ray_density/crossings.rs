@@ -27,6 +27,10 @@ pub(super) struct Crossings {
 /// The two other axes of each axis, in their order.
 const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
+/// What a step along each axis adds to the [number](face) of the next face across each axis.
+const STRIDES: [[usize; 3]; 3] =
+    [[CELLS * CELLS, 1, 1], [1, CELLS * CELLS, CELLS], [CELLS, CELLS, CELLS * CELLS]];
+
 /// The part of a segment inside the grid.
 struct Clipped {
     /// The parameters of the ends, from 0 to 1 along the segment.
@@ -58,15 +62,44 @@ impl Crossings {
                 self.cross(axis, ray[axis] < 0.0, cell);
             }
         }
-        // Walks from cell to cell through the face that comes first. Each axis takes exactly the
-        // steps between the two cells, so the walk reaches the last cell despite rounding.
-        while cell != end {
-            let times = [0, 1, 2].each(|axis| time_of_next_face(axis, cell, end, from, ray));
-            let earliest = (0..3).min_by(|&a, &b| times[a].total_cmp(&times[b]));
-            let axis = earliest.unwrap_or(0);
-            let downward = end[axis] < cell[axis];
-            cell[axis] = if downward { cell[axis] - 1 } else { cell[axis] + 1 };
-            self.cross(axis, downward, cell);
+        self.walk(from, ray, cell, end);
+    }
+
+    /// Walks from cell to cell through the face that comes first. Each axis takes exactly the steps
+    /// between the two cells, so the walk reaches the last cell despite rounding.
+    ///
+    /// Which face comes first cannot be predicted. So hardly a branch depends on it, and the time of
+    /// the face after the next is known before it is needed.
+    fn walk(&mut self, from: DVec3, ray: DVec3, cell: [usize; 3], end: [usize; 3]) {
+        let downward = [0, 1, 2].each(|axis| end[axis] < cell[axis]);
+        let mut left = [0, 1, 2].each(|axis| cell[axis].abs_diff(end[axis]));
+        let time = |axis: usize, plane: f64, left: usize| {
+            let time = (plane - from[axis]) / ray[axis];
+            // Finite, so that an axis with steps left always comes before an axis without.
+            let time = if time.is_nan() { 0.0 } else { time.min(f64::MAX) };
+            order(if left == 0 { f64::INFINITY } else { time })
+        };
+        let step = downward.each(|downward| if downward { -1.0 } else { 1.0 });
+        let plane = [0, 1, 2].each(|axis| cell[axis] + usize::from(!downward[axis]));
+        let mut next_plane = [0, 1, 2].each(|axis| plane[axis] as f64 + step[axis]);
+        let mut times = [0, 1, 2].each(|axis| time(axis, plane[axis] as f64, left[axis]));
+        let mut next =
+            [0, 1, 2].each(|axis| time(axis, next_plane[axis], left[axis].saturating_sub(1)));
+        let mut faces = [0, 1, 2].each(|axis| face(axis, plane[axis], cell));
+        let strides = [0, 1, 2].each(|axis| {
+            STRIDES[axis].each(|stride| if downward[axis] { stride.wrapping_neg() } else { stride })
+        });
+        for _ in 0..left.iter().sum() {
+            let earlier = usize::from(times[1] < times[0]);
+            let axis = if times[2] < times[0].min(times[1]) { 2 } else { earlier };
+            self.faces[axis][usize::from(downward[axis])][faces[axis]] += 1;
+            for (face, stride) in faces.iter_mut().zip(strides[axis]) {
+                *face = face.wrapping_add(stride);
+            }
+            times[axis] = next[axis];
+            left[axis] -= 1;
+            next_plane[axis] += step[axis];
+            next[axis] = time(axis, next_plane[axis], left[axis].saturating_sub(1));
         }
     }
 
@@ -140,22 +173,11 @@ fn cell_at(point: DVec3) -> [usize; 3] {
     cell.each(|index| index.min(CELLS - 1))
 }
 
-/// Returns when a segment leaves `cell` across an axis on its way to the cell `end`; infinity if it
-/// does not.
-fn time_of_next_face(
-    axis: usize,
-    cell: [usize; 3],
-    end: [usize; 3],
-    from: DVec3,
-    ray: DVec3,
-) -> f64 {
-    if cell[axis] == end[axis] {
-        return f64::INFINITY;
-    }
-    let plane = if cell[axis] < end[axis] { cell[axis] + 1 } else { cell[axis] };
-    let time = (plane as f64 - from[axis]) / ray[axis];
-    // Finite, so that an axis with steps left always comes before an axis without.
-    if time.is_nan() { 0.0 } else { time.min(f64::MAX) }
+/// Returns a number in the order of [`f64::total_cmp`].
+#[inline(always)]
+fn order(x: f64) -> i64 {
+    let bits = x.to_bits() as i64;
+    bits ^ ((bits >> 63) as u64 >> 1) as i64
 }
 
 /// Summed-area tables of all counts.
