@@ -73,7 +73,7 @@ impl WideBvh {
     }
 
     /// Answers at most [`AT_ONCE`] rays.
-    pub(super) fn trace(&self, mut find: impl Find, coherence: Coherence) {
+    pub(super) fn trace<F: Find>(&self, mut find: F, coherence: Coherence) {
         let count = find.rays().count();
         if self.kernel == Kernel::Portable || count < FEW {
             (0..count).for_each(|number| find.alone(self, number));
@@ -82,10 +82,11 @@ impl WideBvh {
         let task = Batch::<_, false> { wide: self, find: &mut find, coherence };
         // SAFETY: a layout's kernel is available.
         unsafe {
-            match self.framed {
-                None => vector::dispatch(self.kernel, task),
-                Some(_) => vector::dispatch(self.kernel, task.in_frame()),
+            // Rays in f64 bring their frame, and all hits are searched in flight.
+            if const { !F::DECIDES && !F::ALL } && self.framed.is_some() {
+                return vector::dispatch(self.kernel, task.in_frame());
             }
+            vector::dispatch(self.kernel, task);
         }
     }
 }
