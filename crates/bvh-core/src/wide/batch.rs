@@ -84,9 +84,10 @@ impl WideBvh {
         unsafe {
             // Rays in f64 bring their frame, and all hits are searched in flight.
             if const { !F::DECIDES && !F::ALL } && self.framed.is_some() {
-                return vector::dispatch(self.kernel, task.in_frame());
+                vector::dispatch(self.kernel, task.in_frame())
+            } else {
+                vector::dispatch(self.kernel, task)
             }
-            vector::dispatch(self.kernel, task);
         }
     }
 }
