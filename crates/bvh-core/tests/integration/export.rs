@@ -2,9 +2,11 @@
 //! has the documented bytes.
 
 use crate::support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
-use bvh_core::export::{FirstCountNode, Layout, Target, ThreeMeshNode};
-use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Triangle, any_hit, file, nearest_hit, validate};
-use glam::Vec3;
+use bvh_core::export::{ExportError, FirstCountNode, Layout, Target, ThreeMeshNode};
+use bvh_core::{
+    Aabb, Bvh, Frame, InvalidBvh, Node, Triangle, any_hit, file, nearest_hit, validate,
+};
+use glam::{DMat3, DVec3, Vec3};
 use proptest::prelude::*;
 
 fn returned(tree: &Bvh) -> [(&'static str, Bvh); 3] {
@@ -84,6 +86,24 @@ fn small_trees_deep_trees_and_trees_of_points_have_layouts() {
     }
     for (layout, returned) in returned(&Bvh::default()) {
         assert_eq!(returned, Bvh::default(), "{layout}");
+    }
+}
+
+#[test]
+fn a_tracer_takes_trees_along_the_file_and_divided_ones_where_its_queries_find_no_object_twice() {
+    let cube = Aabb::from([[0.0; 3], [1.0; 3]]);
+    let leaves = [Node::leaf(cube, 0, 1), Node::leaf(cube, 1, 1)];
+    let nodes = [&[Node::inner(cube, 1, 2)], &leaves[..]].concat();
+    let tree = |ids| Bvh::new(nodes.clone(), ids);
+    let frame = Frame::new(DMat3::from_rotation_z(0.5), DVec3::ZERO).unwrap();
+    for target in Target::ALL {
+        let divided = target.check(&tree(vec![0, 0]), 1, false);
+        let expected = ["tinybvh", "obvhs", "madmann91-bvh"].contains(&target.name);
+        assert_eq!(divided.is_ok(), expected, "{divided:?}");
+        assert_eq!(target.check(&tree(vec![0, 0]), 1, true), Ok(()));
+        assert_eq!(target.check(&tree(vec![0, 1]), 2, false), Ok(()));
+        let framed = Bvh { frame: Some(frame), ..tree(vec![0, 1]) };
+        assert_eq!(target.check(&framed, 2, true), Err(ExportError::Framed));
     }
 }
 
