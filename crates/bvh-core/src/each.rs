@@ -2,8 +2,8 @@
 
 /// Maps arrays by code that is always a part of its caller.
 ///
-/// `array::map` is a function of its own, which a build in several units calls for every array of
-/// two: a third of the time of a bake in the builds of tests.
+/// `array::map` is a function of its own, which a build in several units does not inline. It took a
+/// third of the time of a bake in the builds of tests.
 pub(crate) trait Each<T> {
     /// The array of other elements.
     type Of<U>;
