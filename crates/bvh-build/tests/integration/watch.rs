@@ -119,7 +119,7 @@ fn objects_as_large_as_the_scene_are_divided_in_little_time_into_a_tree_about_as
 
 #[test]
 fn spatial_splits_of_objects_as_large_as_the_scene_visit_each_reference_a_few_hundred_times() {
-    for n in [2500, 10_000] {
+    for n in [5000, 20_000] {
         let triangles = soup(n);
         let boxes = boxes(&triangles);
         let most = boxes.len() * 6 / 5;

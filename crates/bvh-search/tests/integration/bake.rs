@@ -117,7 +117,7 @@ fn no_bake_of_work_is_behind_reinsertion_within_the_same_work() {
     for (name, objects) in [("escher", 60), ("bijou", 500), ("konistil", 300), ("S04", 200)] {
         let scene = Scene::load(&format!("{name}:{objects}")).unwrap();
         let boxes = &scene.boxes;
-        for per_object in [1, 5, 20, 30, 50, 100, 200, 400, 1000, 3000, 20_000] {
+        for per_object in [1, 5, 20, 30, 50, 100, 200, 400, 1000, 3000, 20_000, 60_000] {
             let budget = work(per_object * objects);
             let method = bvh_search::reinsertion::Config::default();
             for objective in [Objective::InternalArea, Objective::Layout] {

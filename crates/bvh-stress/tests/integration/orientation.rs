@@ -132,7 +132,7 @@ fn scenes_with_the_best_axes_keep_their_bytes_and_halves_that_disagree_cost_no_m
         let [auto, file] = [Frames::Auto, Frames::File].map(|frame| baked(triangles, frame));
         assert!(auto.save().unwrap() == file.save().unwrap(), "{name}");
         let aside = DVec3::new(2000.0, 100.0, 0.0);
-        for turn in [about_vertical(30.0)].into_iter().chain(random_rotations(1)) {
+        for turn in [about_vertical(30.0)].into_iter().chain(random_rotations(2)) {
             let other = moved(triangles, |point| turn * point + aside);
             let halves = [&triangles[..], &other].concat();
             let [auto, file] = [Frames::Auto, Frames::File]
