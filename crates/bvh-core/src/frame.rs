@@ -149,12 +149,12 @@ impl Frame {
     /// Returns the rotation, row by row, and the centre.
     pub(crate) fn to_bytes(self) -> Vec<u8> {
         let [x, y, z] = self.axes;
-        let rows = [x, y, z, self.centre].each(|row| row.to_array());
+        let rows = [x, y, z, self.centre].map(|row| row.to_array());
         bytemuck::bytes_of(&rows).to_vec()
     }
 
     pub(crate) fn of_bytes(bytes: &[u8; Self::BYTES]) -> Result<Self, InvalidFrame> {
-        let [x, y, z, centre] = bytemuck::cast::<_, [[f64; 3]; 4]>(*bytes).each(DVec3::from);
+        let [x, y, z, centre] = bytemuck::cast::<_, [[f64; 3]; 4]>(*bytes).map(DVec3::from);
         Self::new(DMat3::from_cols(x, y, z).transpose(), centre)
     }
 

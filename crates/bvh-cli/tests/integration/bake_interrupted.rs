@@ -52,7 +52,7 @@ fn ctrl_c_keeps_a_better_tree_in_the_file_and_the_best_one_of_a_decision() {
     while !message.contains("combinations") {
         assert!(messages.read_line(&mut message).unwrap() > 0, "{message}");
     }
-    std::thread::sleep(Duration::from_secs(4));
+    std::thread::sleep(Duration::from_secs(5));
     send("-INT", &child);
     ended(&child.wait_with_output().unwrap(), 130, &[]);
     assert!(number(at, "inspect a.bvh konistil", "work") > 1e6);
@@ -93,7 +93,7 @@ fn ctrl_c_says_what_was_gained_and_also_while_the_frame_is_chosen_keeps_no_worse
     assert!(message.contains("nothing better was found yet; `--from a.bvh"), "{message}");
     assert!(number(at, "verify a.bvh turned.obj", "saved") >= 0.0);
     fs::remove_file(at.join("a.bvh")).unwrap();
-    let (said, message) = bake(Duration::from_secs(2), "--frame=file --json");
+    let (said, message) = bake(Duration::from_secs(4), "--frame=file --json");
     let facts: Value = serde_json::from_str(&said).unwrap();
     let saved = facts["saved"].as_f64().unwrap();
     assert!(saved > 0.0 && message.contains(facts["interrupted"].as_str().unwrap()), "{said}");

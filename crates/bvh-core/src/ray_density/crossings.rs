@@ -27,10 +27,6 @@ pub(super) struct Crossings {
 /// The two other axes of each axis, in their order.
 const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
-/// What a step along each axis adds to the [number](face) of the next face across each axis.
-const STRIDES: [[usize; 3]; 3] =
-    [[CELLS * CELLS, 1, 1], [1, CELLS * CELLS, CELLS], [CELLS, CELLS, CELLS * CELLS]];
-
 /// The part of a segment inside the grid.
 struct Clipped {
     /// The parameters of the ends, from 0 to 1 along the segment.
@@ -42,7 +38,7 @@ struct Clipped {
 
 impl Crossings {
     pub fn new() -> Self {
-        let faces = [[(); 2]; 3].each(|ways| ways.each(|()| vec![0; POINTS * CELLS * CELLS]));
+        let faces = [[(); 2]; 3].map(|ways| ways.map(|()| vec![0; POINTS * CELLS * CELLS]));
         Self { segments: 0, starts: vec![0; CELLS * CELLS * CELLS], faces }
     }
 
@@ -72,22 +68,26 @@ impl Crossings {
     /// the face after the next is known before it is needed.
     fn walk(&mut self, from: DVec3, ray: DVec3, cell: [usize; 3], end: [usize; 3]) {
         let downward = [0, 1, 2].each(|axis| end[axis] < cell[axis]);
-        let mut left = [0, 1, 2].each(|axis| cell[axis].abs_diff(end[axis]));
-        let time = |axis: usize, plane: f64, left: usize| {
+        let mut left = [0, 1, 2].each(|axis| cell[axis].abs_diff(end[axis]) as u32);
+        let step = downward.each(|downward| if downward { -1.0 } else { 1.0 });
+        let last_plane = [0, 1, 2].each(|axis| (end[axis] + usize::from(downward[axis])) as f64);
+        // When the segment crosses an axis with so many steps left.
+        let time = |axis: usize, left: u32| {
+            let plane = last_plane[axis] - step[axis] * (f64::from(left) - 1.0);
             let time = (plane - from[axis]) / ray[axis];
             // Finite, so that an axis with steps left always comes before an axis without.
             let time = if time.is_nan() { 0.0 } else { time.min(f64::MAX) };
             order(if left == 0 { f64::INFINITY } else { time })
         };
-        let step = downward.each(|downward| if downward { -1.0 } else { 1.0 });
-        let plane = [0, 1, 2].each(|axis| cell[axis] + usize::from(!downward[axis]));
-        let mut next_plane = [0, 1, 2].each(|axis| plane[axis] as f64 + step[axis]);
-        let mut times = [0, 1, 2].each(|axis| time(axis, plane[axis] as f64, left[axis]));
-        let mut next =
-            [0, 1, 2].each(|axis| time(axis, next_plane[axis], left[axis].saturating_sub(1)));
-        let mut faces = [0, 1, 2].each(|axis| face(axis, plane[axis], cell));
-        let strides = [0, 1, 2].each(|axis| {
-            STRIDES[axis].each(|stride| if downward[axis] { stride.wrapping_neg() } else { stride })
+        let mut times = [0, 1, 2].each(|axis| time(axis, left[axis]));
+        let mut next = [0, 1, 2].each(|axis| time(axis, left[axis].saturating_sub(1)));
+        let plane = |axis: usize| cell[axis] + usize::from(!downward[axis]);
+        let mut faces = [0, 1, 2].each(|axis| face(axis, plane(axis), cell));
+        // Numbers of faces are linear: a step adds the number of its own place.
+        let strides = [0, 1, 2].each(|along| {
+            let unit = [0, 1, 2].each(|axis| usize::from(axis == along));
+            let strides = [0, 1, 2].each(|axis| face(axis, unit[axis], unit));
+            strides.each(|stride| if downward[along] { stride.wrapping_neg() } else { stride })
         });
         for _ in 0..left.iter().sum() {
             let earlier = usize::from(times[1] < times[0]);
@@ -96,10 +96,9 @@ impl Crossings {
             for (face, stride) in faces.iter_mut().zip(strides[axis]) {
                 *face = face.wrapping_add(stride);
             }
-            times[axis] = next[axis];
             left[axis] -= 1;
-            next_plane[axis] += step[axis];
-            next[axis] = time(axis, next_plane[axis], left[axis].saturating_sub(1));
+            times[axis] = next[axis];
+            next[axis] = time(axis, left[axis].saturating_sub(1));
         }
     }
 
@@ -110,8 +109,8 @@ impl Crossings {
 
     /// Returns the tables of signed counts, one per corner of a box; see [the measure](super).
     pub fn corner_tables(&self) -> Vec<Corner> {
-        let summed = |ways: &[Vec<u32>; 2]| ways.each_ref().each(|faces| summed_faces(faces));
-        let faces = self.faces.each_ref().each(summed);
+        let summed = |ways: &[Vec<u32>; 2]| ways.each_ref().map(|faces| summed_faces(faces));
+        let faces = self.faces.each_ref().map(summed);
         let sums = Sums { starts: summed_starts(&self.starts), faces };
         let mut tables = Vec::with_capacity(8 * CELLS * CELLS * CELLS);
         for cell in cells() {

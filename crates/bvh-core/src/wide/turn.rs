@@ -16,7 +16,7 @@ pub(crate) struct Turn {
 impl Turn {
     pub(crate) fn new(frame: &Frame) -> Self {
         let [x, y, z] = frame.axes;
-        let columns = [0, 1, 2].each(|axis| [x[axis], y[axis], z[axis], 0.0]);
+        let columns = [0, 1, 2].map(|axis| [x[axis], y[axis], z[axis], 0.0]);
         Self { columns, centre: frame.centre }
     }
 
